@@ -1,0 +1,6 @@
+//! From grains to a continuum law: averages of a discrete run, tests for steady state, and the calibration
+//! of the μ(I) rheology with its uncertainties.
+
+pub mod calibration;
+pub mod coarse_graining;
+pub mod steady_state;
