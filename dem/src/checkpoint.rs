@@ -1,0 +1,185 @@
+//! Checkpoints: a simulation taken apart into arrays and put together again, bit for bit.
+//!
+//! The Verlet list is part of the state: its order decides the order of sums, and its age when it is
+//! built again. The shorter list of pairs within reach is not: it changes no bits.
+
+use crate::contact::HISTORY_ROLLING;
+use crate::grains::Grains;
+use crate::neighbours::Row;
+use crate::planes::PlaneContact;
+use crate::record::Record;
+use crate::setup::{Setup, SetupError};
+use crate::simulation::Simulation;
+use nalgebra::Vector3;
+
+fn flatten<const N: usize>(rows: &[[f64; N]]) -> Vec<f64> {
+    rows.iter().flatten().copied().collect()
+}
+
+fn rows<const N: usize>(flat: &[f64]) -> Vec<[f64; N]> {
+    flat.as_chunks::<N>().0.to_vec()
+}
+
+fn wide(small: &[u32]) -> Vec<u64> {
+    small.iter().map(|&x| u64::from(x)).collect()
+}
+
+fn narrow(wide: &[u64]) -> Vec<u32> {
+    wide.iter().map(|&x| x as u32).collect()
+}
+
+impl Simulation {
+    /// The whole state. Going on from it gives the same bits as going on without it.
+    pub fn checkpoint(&mut self) -> Record {
+        self.forget_observation();
+        self.store_history();
+        self.fold_impulses();
+        let n = self.grains.len();
+        let mut record = Record::default();
+        let mut numbers = |name: &str, values: Vec<f64>| {
+            record.numbers.insert(name.into(), values);
+        };
+        numbers("grains/place", flatten(&self.grains.place[..n]));
+        numbers("grains/motion", flatten(&self.grains.motion[..n]));
+        numbers("grains/turn", flatten(&self.grains.turn[..n]));
+        numbers("grains/mass", self.grains.mass.clone());
+        numbers("list/history", self.list.history.clone());
+        let drifts: Vec<_> = self.list.rows.iter().map(|r| r.drift).collect();
+        numbers("list/row_drift", flatten(&drifts));
+        numbers("list/travel", self.list.travel.clone());
+        numbers("list/age", vec![self.list.age]);
+        let walls = &self.plane_contacts;
+        let histories: Vec<_> = walls.contacts.iter().map(|c| c.history).collect();
+        numbers("planes/history", flatten(&histories));
+        numbers("planes/clearance", walls.clearance().to_vec());
+        numbers("wall_impulse", self.impulse.to_vec());
+        numbers("largest_overlap", vec![self.deepest]);
+        numbers("gravity", self.gravity.iter().copied().collect());
+        let mut counts = |name: &str, values: Vec<u64>| {
+            record.counts.insert(name.into(), values);
+        };
+        counts("grains/id", wide(&self.grains.id));
+        counts("list/first", wide(&self.list.first));
+        counts("list/partner", wide(&self.list.partner));
+        let ends: Vec<u32> = self.list.rows.iter().map(|r| r.end).collect();
+        counts("list/row_end", wide(&ends));
+        counts("list/cells", self.list.cells().map(|c| c as u64).to_vec());
+        let of: Vec<u32> = walls.contacts.iter().flat_map(|c| [c.grain, c.plane]).collect();
+        counts("planes/contact", wide(&of));
+        counts(
+            "steps",
+            vec![
+                self.steps,
+                self.steps_since_start,
+                u64::from(self.springs_current),
+            ],
+        );
+        record
+    }
+
+    /// Puts a simulation together from its setup and a checkpoint of it.
+    pub fn resume(setup: Setup, record: &Record) -> Result<Simulation, SetupError> {
+        let mut s = Simulation::unlisted(setup)?;
+        s.read(record).map_err(SetupError::Record)?;
+        s.renew_rows();
+        s.renew_reach();
+        Ok(s)
+    }
+
+    fn read(&mut self, record: &Record) -> Result<(), String> {
+        let n = self.grains.len();
+        let sized = |name: &str, len: usize| -> Result<&[f64], String> {
+            let values = record.numbers(name)?;
+            if values.len() == len {
+                Ok(values)
+            } else {
+                Err(format!("array `{name}` has {} numbers, expected {len}", values.len()))
+            }
+        };
+        let mut grains = Grains {
+            place: rows(sized("grains/place", 4 * n)?),
+            motion: rows(sized("grains/motion", 4 * n)?),
+            turn: rows(sized("grains/turn", 4 * n)?),
+            mass: sized("grains/mass", n)?.to_vec(),
+            id: narrow(record.counts("grains/id")?),
+        };
+        if grains.id.len() != n || grains.id.iter().any(|&id| id as usize >= n) {
+            return Err("array `grains/id` does not number the grains of this scene".into());
+        }
+        grains.pad();
+        let first = narrow(record.counts("list/first")?);
+        let partner = narrow(record.counts("list/partner")?);
+        let rising = first.windows(2).all(|w| w[0] <= w[1]);
+        if first.len() != n + 1
+            || !rising
+            || first[n] as usize != partner.len()
+            || partner.iter().any(|&j| j as usize >= n)
+        {
+            return Err("arrays `list/first` and `list/partner` do not fit each other".into());
+        }
+        let width = self.law.history();
+        self.list.history = sized("list/history", width * partner.len())?.to_vec();
+        let ends = narrow(record.counts("list/row_end")?);
+        let drifts: Vec<[f64; 3]> = rows(sized("list/row_drift", 3 * ends.len())?);
+        let cells: Vec<usize> = record.counts("list/cells")?.iter().map(|&c| c as usize).collect();
+        let [nx, ny, nz] = cells[..] else {
+            return Err("array `list/cells` must have 3 numbers".into());
+        };
+        if ny.checked_mul(nz) != Some(ends.len())
+            || ends.last().is_none_or(|&e| e as usize != n)
+            || ends.windows(2).any(|w| w[0] > w[1])
+        {
+            return Err("array `list/row_end` does not cover the grains".into());
+        }
+        let mut start = 0;
+        self.list.rows = ends
+            .iter()
+            .zip(drifts)
+            .map(|(&end, drift)| {
+                let row = Row { start, end, drift };
+                start = end;
+                row
+            })
+            .collect();
+        self.list.travel = sized("list/travel", ends.len())?.to_vec();
+        self.list.age = sized("list/age", 1)?[0];
+        self.list.first = first;
+        self.list.partner = partner;
+        self.list.restore([nx, ny, nz], self.domain.periodic);
+        self.grains = grains;
+
+        let of = narrow(record.counts("planes/contact")?);
+        let histories: Vec<[f64; HISTORY_ROLLING]> =
+            rows(sized("planes/history", of.len() / 2 * HISTORY_ROLLING)?);
+        let contacts: Vec<PlaneContact> = of
+            .as_chunks::<2>()
+            .0
+            .iter()
+            .zip(histories)
+            .map(|(&[grain, plane], history)| PlaneContact {
+                grain,
+                plane,
+                history,
+                slot: [[0.0; 4]; 3],
+            })
+            .collect();
+        if contacts
+            .iter()
+            .any(|c| c.grain as usize >= n || c.plane as usize >= self.planes.len())
+        {
+            return Err("array `planes/contact` names unknown grains or planes".into());
+        }
+        let clearance = sized("planes/clearance", ends.len() * self.planes.len())?.to_vec();
+        self.plane_contacts.restore(contacts, clearance, n);
+
+        self.impulse.copy_from_slice(sized("wall_impulse", 3)?);
+        self.deepest = sized("largest_overlap", 1)?[0];
+        self.gravity = Vector3::from_column_slice(sized("gravity", 3)?);
+        let &[steps, since_start, springs_current] = record.counts("steps")? else {
+            return Err("array `steps` must have 3 numbers".into());
+        };
+        (self.steps, self.steps_since_start) = (steps, since_start);
+        self.springs_current = springs_current != 0;
+        Ok(())
+    }
+}

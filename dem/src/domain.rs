@@ -1,0 +1,76 @@
+//! The box that grains live in, with its periodic axes.
+
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// An axis-aligned box `[lower, upper]` in metres; a periodic axis wraps around.
+///
+/// Along an axis that is not periodic the bounds only say where the search grid is laid: grains may
+/// leave them and are still found.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Domain {
+    /// Lower corner [m].
+    pub lower: Vector3<f64>,
+    /// Upper corner [m].
+    pub upper: Vector3<f64>,
+    /// Which axes wrap around.
+    pub periodic: [bool; 3],
+}
+
+impl Domain {
+    /// Edge lengths [m].
+    pub fn lengths(&self) -> Vector3<f64> {
+        self.upper - self.lower
+    }
+
+    /// Area of the floor, `L_x L_y` [m²].
+    pub fn floor_area(&self) -> f64 {
+        let l = self.lengths();
+        l.x * l.y
+    }
+
+    /// The shortest periodic image of a separation vector [m].
+    pub fn nearest_image(&self, mut separation: Vector3<f64>) -> Vector3<f64> {
+        let l = self.lengths();
+        for axis in 0..3 {
+            if self.periodic[axis] {
+                separation[axis] -= l[axis] * (separation[axis] / l[axis]).round_ties_even();
+            }
+        }
+        separation
+    }
+
+    /// The image of a position that lies inside the box along periodic axes [m].
+    pub fn wrap(&self, mut position: Vector3<f64>) -> Vector3<f64> {
+        let l = self.lengths();
+        for axis in 0..3 {
+            if self.periodic[axis] {
+                position[axis] -= l[axis] * ((position[axis] - self.lower[axis]) / l[axis]).floor();
+                // Round-off may land a hair below `lower` on the upper edge itself.
+                if position[axis] >= self.upper[axis] {
+                    position[axis] = self.lower[axis];
+                }
+            }
+        }
+        position
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn images_wrap_only_along_periodic_axes() {
+        let domain = Domain {
+            lower: Vector3::new(0.0, 0.0, -1.0),
+            upper: Vector3::new(2.0, 3.0, 9.0),
+            periodic: [true, true, false],
+        };
+        let s = domain.nearest_image(Vector3::new(1.9, -2.9, 9.5));
+        assert!((s - Vector3::new(-0.1, 0.1, 9.5)).norm() < 1e-14);
+        let x = domain.wrap(Vector3::new(-0.5, 7.0, 20.0));
+        assert!((x - Vector3::new(1.5, 1.0, 20.0)).norm() < 1e-14);
+        assert_eq!(domain.floor_area(), 6.0);
+    }
+}

@@ -1,0 +1,126 @@
+//! State of the grains, one row of four numbers for each thing a contact reads.
+
+use nalgebra::Vector3;
+
+/// A grain as a scene describes it (SI).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Grain {
+    /// Centre [m].
+    pub position: Vector3<f64>,
+    /// Velocity [m/s].
+    pub velocity: Vector3<f64>,
+    /// Angular velocity [rad/s].
+    pub spin: Vector3<f64>,
+    /// Radius [m].
+    pub radius: f64,
+    /// Density of the grain's material [kg/m³].
+    pub density: f64,
+    /// Keeps its velocity whatever touches it: part of a rough base.
+    pub fixed: bool,
+}
+
+impl Grain {
+    /// A grain at rest.
+    pub fn at_rest(position: Vector3<f64>, radius: f64, density: f64) -> Self {
+        Grain {
+            position,
+            velocity: Vector3::zeros(),
+            spin: Vector3::zeros(),
+            radius,
+            density,
+            fixed: false,
+        }
+    }
+
+    /// Mass of the sphere [kg].
+    pub fn mass(&self) -> f64 {
+        4.0 / 3.0 * std::f64::consts::PI * self.radius.powi(3) * self.density
+    }
+}
+
+/// Moment of inertia of a sphere is this times m R².
+pub(crate) const SPHERE_INERTIA: f64 = 0.4;
+
+/// Structure of rows. One dummy grain without size or mass follows the last one: it pads batches.
+///
+/// The fourth number of a row is what a contact needs as a *sum* over its two grains, so that one
+/// addition combines both sides before rows become lanes.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Grains {
+    /// Centre, radius.
+    pub place: Vec<[f64; 4]>,
+    /// Velocity half a step back, inverse mass (0 = fixed).
+    pub motion: Vec<[f64; 4]>,
+    /// Radius times angular velocity half a step back, inverse radius.
+    pub turn: Vec<[f64; 4]>,
+    /// Mass [kg], also of fixed grains.
+    pub mass: Vec<f64>,
+    /// Number given at the start.
+    pub id: Vec<u32>,
+}
+
+impl Grains {
+    pub fn new(grains: &[Grain]) -> Self {
+        let mut state = Grains::default();
+        for (id, g) in grains.iter().enumerate() {
+            let (x, v, s) = (g.position, g.velocity, g.spin * g.radius);
+            let inverse_mass = if g.fixed { 0.0 } else { 1.0 / g.mass() };
+            state.place.push([x.x, x.y, x.z, g.radius]);
+            state.motion.push([v.x, v.y, v.z, inverse_mass]);
+            state.turn.push([s.x, s.y, s.z, 1.0 / g.radius]);
+            state.mass.push(g.mass());
+            state.id.push(id as u32);
+        }
+        state.pad();
+        state
+    }
+
+    /// Puts the dummy behind the last grain.
+    pub fn pad(&mut self) {
+        self.place.push([0.0; 4]);
+        self.motion.push([0.0; 4]);
+        self.turn.push([0.0; 4]);
+    }
+
+    /// Number of real grains.
+    pub fn len(&self) -> usize {
+        self.id.len()
+    }
+
+    pub fn is_fixed(&self, i: usize) -> bool {
+        self.motion[i][3] == 0.0
+    }
+
+    /// Reorders all rows so that new grain `k` is old grain `order[k]`.
+    pub fn reorder(&mut self, order: &[u32], scratch: &mut Grains) {
+        let n = self.len();
+        scratch.place.clear();
+        scratch.motion.clear();
+        scratch.turn.clear();
+        scratch.mass.clear();
+        scratch.id.clear();
+        scratch
+            .place
+            .extend(order.iter().map(|&o| self.place[o as usize]));
+        scratch
+            .motion
+            .extend(order.iter().map(|&o| self.motion[o as usize]));
+        scratch
+            .turn
+            .extend(order.iter().map(|&o| self.turn[o as usize]));
+        scratch
+            .mass
+            .extend(order.iter().map(|&o| self.mass[o as usize]));
+        scratch
+            .id
+            .extend(order.iter().map(|&o| self.id[o as usize]));
+        scratch.pad();
+        debug_assert_eq!(scratch.len(), n);
+        std::mem::swap(self, scratch);
+    }
+}
+
+/// The first three numbers of a row.
+pub(crate) fn vector(row: &[f64; 4]) -> Vector3<f64> {
+    Vector3::new(row[0], row[1], row[2])
+}

@@ -1,0 +1,38 @@
+//! Discrete element engine: grains, contact laws, search, walls, preparation.
+//!
+//! * A scene hands over a [`Setup`]: grains, planes, a contact law, gravity, a time step.
+//! * [`Simulation::advance`] integrates Newton's equations by leap-frog.
+//! * [`Simulation::snapshot`] shows all grains and contacts of one instant; coarse-graining and
+//!   output need nothing else.
+//!
+//! SI units; overlap and compression positive; x downslope, y across, z away from the ground.
+//! Results are the same bits for any number of threads and after a restart from a [`Record`].
+
+mod checkpoint;
+pub mod contact;
+mod domain;
+mod energy;
+mod forces;
+mod grains;
+mod lanes;
+mod motion;
+mod neighbours;
+mod observe;
+mod planes;
+pub mod preparation;
+mod reach;
+mod record;
+mod setup;
+mod simulation;
+mod snapshot;
+pub mod timestep;
+
+pub use contact::{ContactLaw, DashpotSampling, Hooke, Lever, ShapeParameter, TangentialSpring};
+pub use domain::Domain;
+pub use energy::Energy;
+pub use grains::Grain;
+pub use planes::Plane;
+pub use record::Record;
+pub use setup::{Setup, SetupError, Threads};
+pub use simulation::{Diverged, Simulation};
+pub use snapshot::{ContactSample, GrainSample, Partner, Snapshot};

@@ -1,0 +1,456 @@
+//! Who may come to touch whom: a cell grid, a Verlet list with a skin, and how long it stays valid.
+//!
+//! Grains are kept sorted by cell, x fastest. All cells with the same (y, z) form a *row*: a
+//! contiguous range of grains. The list holds all pairs closer than `R_i + R_j + skin`, each once,
+//! i < j, ordered by i; it is valid as long as no two grains can have approached by more than the
+//! skin.
+//!
+//! **How long is that?** Each row r gets a reference velocity w_r (the mean of its grains when the
+//! list was built) and a travel bound `T_r = Σ dt max |v - w_r|`. Two grains of rows a and b can have
+//! approached by at most `T_a + T_b + |w_a - w_b| t`. Rows up to two apart are checked against the
+//! skin; with cells no narrower than a contact plus the skin, rows further apart are then safe by
+//! the chain of rows between them. A flow as a whole, however fast, and its shear over distances
+//! beyond two cells cost no rebuilds: only motion against the neighbourhood does. The bound needs no
+//! stored positions and does not depend on threads.
+
+use crate::domain::Domain;
+use crate::grains::Grains;
+use rayon::prelude::*;
+
+/// Grains `start..end` share a (y, z) column of cells.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Row {
+    pub start: u32,
+    pub end: u32,
+    /// Reference velocity w.
+    pub drift: [f64; 3],
+}
+
+/// The cell grid as it was laid at the last build.
+#[derive(Clone, Debug, Default)]
+struct Grid {
+    origin: [f64; 3],
+    inverse_cell: [f64; 3],
+    cells: [usize; 3],
+    periodic: [bool; 3],
+}
+
+impl Grid {
+    fn lay(grains: &Grains, domain: &Domain, reach: f64) -> Grid {
+        let n = grains.len();
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        for x in &grains.place[..n] {
+            for k in 0..3 {
+                low[k] = low[k].min(x[k]);
+                high[k] = high[k].max(x[k]);
+            }
+        }
+        let mut grid = Grid {
+            periodic: domain.periodic,
+            ..Grid::default()
+        };
+        let lengths = domain.lengths();
+        // A lone grain far away must not cost a grid of empty cells: open axes are coarsened.
+        let mut stretch = 1.0;
+        loop {
+            for k in 0..3 {
+                let (from, length, size) = if domain.periodic[k] {
+                    (domain.lower[k], lengths[k], reach)
+                } else {
+                    (low[k], (high[k] - low[k]).max(reach), reach * stretch)
+                };
+                grid.cells[k] = ((length / size) as usize).max(1);
+                grid.origin[k] = from;
+                grid.inverse_cell[k] = grid.cells[k] as f64 / length;
+            }
+            let count = grid.cells.iter().fold(1.0, |c, &m| c * m as f64);
+            if count <= 8.0 * n as f64 + 4096.0 || domain.periodic == [true; 3] {
+                return grid;
+            }
+            stretch *= 1.5;
+        }
+    }
+
+    fn index(&self, x: &[f64; 4]) -> usize {
+        let mut cell = [0; 3];
+        for k in 0..3 {
+            let c = (x[k] - self.origin[k]) * self.inverse_cell[k];
+            cell[k] = (c.max(0.0) as usize).min(self.cells[k] - 1);
+        }
+        (cell[2] * self.cells[1] + cell[1]) * self.cells[0] + cell[0]
+    }
+
+    /// Distinct cell numbers within `reach` cells of `c` along an axis.
+    fn around(&self, axis: usize, c: usize, reach: isize, into: &mut Vec<usize>) {
+        into.clear();
+        let n = self.cells[axis] as isize;
+        for d in -reach..=reach {
+            let mut m = c as isize + d;
+            if self.periodic[axis] {
+                m = m.rem_euclid(n);
+            } else if m < 0 || m >= n {
+                continue;
+            }
+            if !into.contains(&(m as usize)) {
+                into.push(m as usize);
+            }
+        }
+    }
+}
+
+/// Verlet list with contact history.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Neighbours {
+    /// Pairs of grain i: `first[i]..first[i + 1]`.
+    pub first: Vec<u32>,
+    /// The partner j > i of each pair.
+    pub partner: Vec<u32>,
+    /// History of each pair, `history_width` numbers; zero where the pair does not touch.
+    pub history: Vec<f64>,
+    pub rows: Vec<Row>,
+    /// T of each row since the build [m].
+    pub travel: Vec<f64>,
+    /// Time since the build [s].
+    pub age: f64,
+    /// Row pairs up to two apart, a ≤ b.
+    row_pairs: Vec<(u32, u32)>,
+    grid: Grid,
+    build: Build,
+}
+
+/// Buffers of a build, kept between builds.
+#[derive(Clone, Debug, Default)]
+struct Build {
+    cell: Vec<u32>,
+    cell_first: Vec<u32>,
+    order: Vec<u32>,
+    new_index: Vec<u32>,
+    sorted: Grains,
+    parts: Vec<Part>,
+    carried: Vec<Carried>,
+    carried_sorted: Vec<Carried>,
+    carried_first: Vec<u32>,
+    old_history: Vec<f64>,
+}
+
+/// Pairs found for a range of rows.
+#[derive(Clone, Debug, Default)]
+struct Part {
+    rows: std::ops::Range<usize>,
+    counts: Vec<u32>,
+    partner: Vec<u32>,
+    scratch: [Vec<usize>; 3],
+}
+
+/// A touching contact on its way to the new list.
+#[derive(Clone, Copy, Debug, Default)]
+struct Carried {
+    i: u32,
+    j: u32,
+    source: u32,
+    swapped: bool,
+}
+
+/// Rows handled by one task of a build: small enough to share, large enough not to matter.
+const ROWS_A_PART: usize = 16;
+
+impl Neighbours {
+    /// Sorts the grains and lists all pairs closer than `R_i + R_j + skin`, keeping histories.
+    ///
+    /// `history_width` numbers a contact; the first six change sign when a pair changes order.
+    pub fn build(
+        &mut self,
+        grains: &mut Grains,
+        domain: &Domain,
+        largest_radius: f64,
+        skin: f64,
+        history_width: usize,
+        parallel: bool,
+    ) {
+        let n = grains.len();
+        for x in &mut grains.place[..n] {
+            let wrapped = domain.wrap(crate::grains::vector(x));
+            (x[0], x[1], x[2]) = (wrapped.x, wrapped.y, wrapped.z);
+        }
+        self.grid = Grid::lay(grains, domain, 2.0 * largest_radius + skin);
+        self.collect_touching(n, history_width);
+        self.sort(grains);
+        self.lay_rows(grains);
+        self.find_pairs(grains, domain, skin, parallel);
+        self.carry_history(n, history_width);
+        self.age = 0.0;
+    }
+
+    /// Whether some pair outside the list may have come closer than the skin.
+    pub fn outdated(&self, skin: f64) -> bool {
+        outdated(&self.row_pairs, &self.rows, &self.travel, self.age, skin)
+    }
+
+    /// The same question for a shorter list that was made later from this one.
+    pub fn outdated_since(&self, travel: &[f64], age: f64, skin: f64) -> bool {
+        outdated(&self.row_pairs, &self.rows, travel, age, skin)
+    }
+
+    /// Where a grain of the previous order stands now.
+    pub fn new_index(&self, old: u32) -> u32 {
+        self.build.new_index[old as usize]
+    }
+
+    /// Number of cells along each axis; with the rows it restores the list's bookkeeping.
+    pub fn cells(&self) -> [usize; 3] {
+        self.grid.cells
+    }
+
+    /// Lays the bookkeeping of a list that was read back from a checkpoint.
+    pub fn restore(&mut self, cells: [usize; 3], periodic: [bool; 3]) {
+        self.grid.cells = cells;
+        self.grid.periodic = periodic;
+        self.pair_rows();
+    }
+
+    fn sort(&mut self, grains: &mut Grains) {
+        let n = grains.len();
+        let b = &mut self.build;
+        let cells = self.grid.cells.iter().product::<usize>();
+        b.cell.clear();
+        b.cell
+            .extend(grains.place[..n].iter().map(|x| self.grid.index(x) as u32));
+        b.cell_first.clear();
+        b.cell_first.resize(cells + 1, 0);
+        for &c in &b.cell {
+            b.cell_first[c as usize + 1] += 1;
+        }
+        for c in 0..cells {
+            b.cell_first[c + 1] += b.cell_first[c];
+        }
+        b.order.clear();
+        b.order.resize(n, 0);
+        b.new_index.clear();
+        b.new_index.resize(n, 0);
+        let mut next = std::mem::take(&mut b.carried_first);
+        next.clear();
+        next.extend_from_slice(&b.cell_first[..cells]);
+        for (old, &c) in b.cell.iter().enumerate() {
+            let new = next[c as usize];
+            next[c as usize] += 1;
+            b.order[new as usize] = old as u32;
+            b.new_index[old] = new;
+        }
+        b.carried_first = next;
+        grains.reorder(&b.order, &mut b.sorted);
+    }
+
+    fn lay_rows(&mut self, grains: &Grains) {
+        let [nx, ny, nz] = self.grid.cells;
+        self.rows.clear();
+        for row in 0..ny * nz {
+            let start = self.build.cell_first[row * nx];
+            let end = self.build.cell_first[(row + 1) * nx];
+            let mut drift = [0.0; 3];
+            for v in &grains.motion[start as usize..end as usize] {
+                for k in 0..3 {
+                    drift[k] += v[k];
+                }
+            }
+            if end > start {
+                drift = drift.map(|d| d / (end - start) as f64);
+            } else if row >= ny {
+                // An empty row links its neighbours in the chain of the bound: any value is right,
+                // a value like theirs is tight.
+                drift = self.rows[row - ny].drift;
+            }
+            self.rows.push(Row { start, end, drift });
+        }
+        self.travel.clear();
+        self.travel.resize(self.rows.len(), 0.0);
+        self.pair_rows();
+    }
+
+    fn pair_rows(&mut self) {
+        let [_, ny, nz] = self.grid.cells;
+        self.row_pairs.clear();
+        let (mut ys, mut zs) = (Vec::new(), Vec::new());
+        for z in 0..nz {
+            for y in 0..ny {
+                let a = z * ny + y;
+                self.grid.around(2, z, 2, &mut zs);
+                self.grid.around(1, y, 2, &mut ys);
+                for &zb in &zs {
+                    for &yb in &ys {
+                        let b = zb * ny + yb;
+                        if b >= a {
+                            self.row_pairs.push((a as u32, b as u32));
+                        }
+                    }
+                }
+            }
+        }
+    }
+
+    fn find_pairs(&mut self, grains: &Grains, domain: &Domain, skin: f64, parallel: bool) {
+        let rows = self.rows.len();
+        let parts = rows.div_ceil(ROWS_A_PART);
+        self.build.parts.resize_with(parts, Part::default);
+        for (p, part) in self.build.parts.iter_mut().enumerate() {
+            part.rows = p * ROWS_A_PART..((p + 1) * ROWS_A_PART).min(rows);
+        }
+        let mut parts = std::mem::take(&mut self.build.parts);
+        let (grid, first) = (&self.grid, &self.build.cell_first);
+        let search = |part: &mut Part| search_rows(part, grid, first, grains, domain, skin);
+        if parallel {
+            parts.par_iter_mut().for_each(search);
+        } else {
+            parts.iter_mut().for_each(search);
+        }
+        self.first.clear();
+        self.first.push(0);
+        self.partner.clear();
+        let mut total = 0;
+        for part in &parts {
+            for &count in &part.counts {
+                total += count;
+                self.first.push(total);
+            }
+            self.partner.extend_from_slice(&part.partner);
+        }
+        self.build.parts = parts;
+    }
+
+    /// Remembers the touching contacts of the old list.
+    fn collect_touching(&mut self, n: usize, width: usize) {
+        let b = &mut self.build;
+        b.carried.clear();
+        std::mem::swap(&mut b.old_history, &mut self.history);
+        if width == 0 || self.first.len() != n + 1 {
+            return;
+        }
+        for i in 0..n {
+            for k in self.first[i]..self.first[i + 1] {
+                let at = k as usize * width;
+                if b.old_history[at..at + width].iter().any(|&h| h != 0.0) {
+                    b.carried.push(Carried {
+                        i: i as u32,
+                        j: self.partner[k as usize],
+                        source: k,
+                        swapped: false,
+                    });
+                }
+            }
+        }
+    }
+
+    fn carry_history(&mut self, n: usize, width: usize) {
+        self.history.clear();
+        self.history.resize(self.partner.len() * width, 0.0);
+        let b = &mut self.build;
+        b.carried_first.clear();
+        b.carried_first.resize(n + 1, 0);
+        for c in &mut b.carried {
+            let (i, j) = (b.new_index[c.i as usize], b.new_index[c.j as usize]);
+            c.swapped = i > j;
+            (c.i, c.j) = (i.min(j), i.max(j));
+            b.carried_first[c.i as usize + 1] += 1;
+        }
+        for i in 0..n {
+            b.carried_first[i + 1] += b.carried_first[i];
+        }
+        b.carried_sorted.clear();
+        b.carried_sorted
+            .resize(b.carried.len(), Carried::default());
+        // Fill from the back of each bucket, which leaves `carried_first` at the bucket's start.
+        for c in b.carried.iter().rev() {
+            let at = &mut b.carried_first[c.i as usize + 1];
+            *at -= 1;
+            b.carried_sorted[*at as usize] = *c;
+        }
+        for i in 0..n {
+            let (from, to) = (
+                b.carried_first[i + 1] as usize,
+                b.carried_first
+                    .get(i + 2)
+                    .map_or(b.carried_sorted.len(), |&f| f as usize),
+            );
+            for c in &b.carried_sorted[from..to] {
+                for k in self.first[i] as usize..self.first[i + 1] as usize {
+                    if self.partner[k] != c.j {
+                        continue;
+                    }
+                    let old = &b.old_history[c.source as usize * width..][..width];
+                    let new = &mut self.history[k * width..][..width];
+                    new.copy_from_slice(old);
+                    if c.swapped {
+                        // Vectors of i against j turn round; the twist about the normal does not.
+                        new.iter_mut().take(6).for_each(|h| *h = -*h);
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn outdated(pairs: &[(u32, u32)], rows: &[Row], travel: &[f64], age: f64, skin: f64) -> bool {
+    pairs.iter().any(|&(a, b)| {
+        let (ra, rb) = (&rows[a as usize], &rows[b as usize]);
+        let d: [f64; 3] = std::array::from_fn(|k| ra.drift[k] - rb.drift[k]);
+        let apart = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt() * age;
+        // Written so that a travel that is not a number counts as outdated.
+        !(travel[a as usize] + travel[b as usize] + apart <= skin)
+    })
+}
+
+fn search_rows(
+    part: &mut Part,
+    grid: &Grid,
+    first: &[u32],
+    grains: &Grains,
+    domain: &Domain,
+    skin: f64,
+) {
+    let [nx, ny, _] = grid.cells;
+    let lengths = domain.lengths();
+    let inverse: [f64; 3] = std::array::from_fn(|k| {
+        if domain.periodic[k] {
+            1.0 / lengths[k]
+        } else {
+            0.0
+        }
+    });
+    part.counts.clear();
+    part.partner.clear();
+    let [xs, ys, zs] = &mut part.scratch;
+    for row in part.rows.clone() {
+        grid.around(1, row % ny, 1, ys);
+        grid.around(2, row / ny, 1, zs);
+        for x in 0..nx {
+            grid.around(0, x, 1, xs);
+            let cell = row * nx + x;
+            for i in first[cell]..first[cell + 1] {
+                let before = part.partner.len();
+                let xi = &grains.place[i as usize];
+                let reach = xi[3] + skin;
+                for &z in zs.iter() {
+                    for &y in ys.iter() {
+                        for &xc in xs.iter() {
+                            let other = (z * ny + y) * nx + xc;
+                            let from = first[other].max(i + 1);
+                            for j in from..first[other + 1].max(from) {
+                                let xj = &grains.place[j as usize];
+                                let mut r2 = 0.0;
+                                for k in 0..3 {
+                                    let d = xi[k] - xj[k];
+                                    let d = d - lengths[k] * (d * inverse[k]).round_ties_even();
+                                    r2 += d * d;
+                                }
+                                let near = reach + xj[3];
+                                if r2 < near * near {
+                                    part.partner.push(j);
+                                }
+                            }
+                        }
+                    }
+                }
+                part.counts.push((part.partner.len() - before) as u32);
+            }
+        }
+    }
+}

@@ -1,0 +1,253 @@
+//! Looking at a simulation: snapshots, energies, sums, hash.
+
+use crate::energy::Energy;
+use crate::grains::{SPHERE_INERTIA, vector};
+use crate::motion::{self, Pull};
+use crate::simulation::Simulation;
+use crate::snapshot::{ContactSample, GrainSample, Partner, Snapshot};
+use nalgebra::Vector3;
+
+impl Simulation {
+    /// What the motion pass would read now.
+    pub(crate) fn pull(&self) -> Pull<'_> {
+        let g = self.gravity;
+        Pull {
+            reach: &self.reach,
+            planes: &self.plane_contacts,
+            slot_rows: self.slot_rows(),
+            gravity: [g.x, g.y, g.z, 0.0],
+            kick: 0.0,
+            drift: 0.0,
+        }
+    }
+
+    /// Velocity and angular velocity of a grain at the time of its position.
+    pub(crate) fn synchronised(&self, pull: &Pull, i: usize) -> (Vector3<f64>, Vector3<f64>) {
+        let (v, s) = (&self.grains.motion[i], &self.grains.turn[i]);
+        let (inverse_mass, inverse_radius) = (v[3], s[3]);
+        let mut velocity = vector(v);
+        let mut turn = vector(s);
+        if self.steps_since_start > 0 && inverse_mass > 0.0 {
+            let [force, torque, moment] = motion::gather(pull, i);
+            let half = 0.5 * self.timestep;
+            velocity += half * (vector(&force) * inverse_mass + self.gravity);
+            turn += half / SPHERE_INERTIA
+                * inverse_mass
+                * (vector(&torque) + vector(&moment) * inverse_radius);
+        }
+        (velocity, turn * inverse_radius)
+    }
+
+    pub(crate) fn grain_sample(&self, pull: &Pull, i: usize) -> GrainSample {
+        let (velocity, spin) = self.synchronised(pull, i);
+        GrainSample {
+            id: self.grains.id[i],
+            position: self.domain.wrap(vector(&self.grains.place[i])),
+            velocity,
+            spin,
+            radius: self.grains.place[i][3],
+            mass: self.grains.mass[i],
+            fixed: self.grains.is_fixed(i),
+        }
+    }
+
+    /// All grains at this instant, in the order of their rows.
+    pub(crate) fn samples(&mut self) -> Vec<GrainSample> {
+        self.observe();
+        let pull = self.pull();
+        (0..self.grains.len())
+            .map(|i| self.grain_sample(&pull, i))
+            .collect()
+    }
+
+    /// Shows all grains and touching contacts; the buffers of `into` are reused.
+    pub fn snapshot(&mut self, into: &mut Snapshot) {
+        self.observe();
+        into.time = self.time();
+        into.domain = self.domain;
+        into.gravity = self.gravity;
+        let pull = self.pull();
+        into.grains.clear();
+        into.grains
+            .extend((0..self.grains.len()).map(|i| self.grain_sample(&pull, i)));
+        into.contacts.clear();
+        let rows = pull.slot_rows;
+        for k in 0..self.reach.count {
+            let (i, j) = (self.reach.i[k] as usize, self.reach.j[k] as usize);
+            let (a, b) = (&self.grains.place[i], &self.grains.place[j]);
+            let apart = self.domain.nearest_image(vector(a) - vector(b));
+            let (distance, radii) = (apart.norm(), a[3] + b[3]);
+            if distance >= radii {
+                continue;
+            }
+            // The contact point divides the line of centres as the radii do.
+            into.contacts.push(ContactSample {
+                grain: i,
+                partner: Partner::Grain(j),
+                overlap: radii - distance,
+                force: vector(&self.reach.slots[k * rows]),
+                arm: -apart * (a[3] / radii),
+                partner_arm: apart * (b[3] / radii),
+            });
+        }
+        for contact in &self.plane_contacts.contacts {
+            let i = contact.grain as usize;
+            let plane = &self.planes[contact.plane as usize];
+            let x = &self.grains.place[i];
+            let distance = plane.distance(&vector(x));
+            if distance >= x[3] || self.grains.is_fixed(i) {
+                continue;
+            }
+            into.contacts.push(ContactSample {
+                grain: i,
+                partner: Partner::Plane(contact.plane as usize),
+                overlap: x[3] - distance,
+                force: vector(&contact.slot[0]),
+                arm: -plane.normal * distance,
+                partner_arm: Vector3::zeros(),
+            });
+        }
+    }
+
+    /// Kinetic and elastic energy at this instant.
+    pub fn energy(&mut self) -> Energy {
+        self.observe();
+        let pull = self.pull();
+        let mut energy = Energy::default();
+        for i in (0..self.grains.len()).filter(|&i| !self.grains.is_fixed(i)) {
+            let (v, w) = self.synchronised(&pull, i);
+            let (m, r) = (self.grains.mass[i], self.grains.place[i][3]);
+            energy.translation += 0.5 * m * v.norm_squared();
+            energy.rotation += 0.5 * SPHERE_INERTIA * m * r * r * w.norm_squared();
+        }
+        let width = self.law.history();
+        for k in 0..self.reach.count {
+            let (i, j) = (self.reach.i[k] as usize, self.reach.j[k] as usize);
+            let (a, b) = (&self.grains.place[i], &self.grains.place[j]);
+            let apart = self.domain.nearest_image(vector(a) - vector(b)).norm();
+            let history: Vec<f64> = self.reach.history[k / 4 * width..][..width]
+                .iter()
+                .map(|row| row[k % 4])
+                .collect();
+            self.add_elastic(&mut energy, a[3] + b[3] - apart, a[3] * b[3] / (a[3] + b[3]), &history);
+        }
+        for contact in &self.plane_contacts.contacts {
+            let i = contact.grain as usize;
+            let x = &self.grains.place[i];
+            let overlap = x[3] - self.planes[contact.plane as usize].distance(&vector(x));
+            if !self.grains.is_fixed(i) {
+                self.add_elastic(&mut energy, overlap, x[3], &contact.history[..width]);
+            }
+        }
+        energy
+    }
+
+    fn add_elastic(&self, energy: &mut Energy, overlap: f64, reduced_radius: f64, history: &[f64]) {
+        if overlap <= 0.0 {
+            return;
+        }
+        let square = |h: &[f64]| h.iter().map(|x| x * x).sum::<f64>();
+        let (normal, tangential) = (&self.law.normal, &self.law.tangential);
+        energy.normal += 0.5 * normal.stiffness * overlap * overlap;
+        energy.tangential += 0.5 * tangential.stiffness(normal) * square(&history[..3]);
+        if let Some(shape) = &self.law.rolling {
+            let k_r = shape.rolling_stiffness(normal, reduced_radius);
+            let k_t = shape.twisting_stiffness(normal, tangential, reduced_radius);
+            energy.rolling += 0.5 * k_r * square(&history[3..6]);
+            energy.twisting += 0.5 * k_t * history[6] * history[6];
+        }
+    }
+
+    /// Momentum of the free grains at this instant [N s].
+    pub fn momentum(&mut self) -> Vector3<f64> {
+        self.samples()
+            .iter()
+            .filter(|g| !g.fixed)
+            .map(|g| g.mass * g.velocity)
+            .sum()
+    }
+
+    /// Momentum that fixed grains and planes have taken from the free grains since the start [N s].
+    ///
+    /// With constant gravity g: `momentum(t) + wall_impulse(t) - m g t` is constant to round-off, up
+    /// to half a step's force, since velocities inside live half a step back.
+    pub fn wall_impulse(&mut self) -> Vector3<f64> {
+        self.fold_impulses();
+        Vector3::from(self.impulse)
+    }
+
+    /// Mass of the free grains [kg].
+    pub fn free_mass(&self) -> f64 {
+        (0..self.grains.len())
+            .filter(|&i| !self.grains.is_fixed(i))
+            .map(|i| self.grains.mass[i])
+            .sum()
+    }
+
+    /// Momentum of the free grains as the integrator holds it, half a step back [N s].
+    ///
+    /// `leapfrog_momentum(t) + wall_impulse(t)` changes by exactly the weight times time.
+    pub fn leapfrog_momentum(&self) -> Vector3<f64> {
+        let mut sum = Vector3::zeros();
+        for i in (0..self.grains.len()).filter(|&i| !self.grains.is_fixed(i)) {
+            sum += self.grains.mass[i] * vector(&self.grains.motion[i]);
+        }
+        sum
+    }
+
+    /// Hash of the bits of all positions, velocities, spins and springs, in the grains' own order.
+    ///
+    /// 64-bit FNV-1a, in hex. The same for any number of threads and after a restart.
+    pub fn state_hash(&mut self) -> String {
+        self.observe();
+        let n = self.grains.len();
+        let mut by_id: Vec<usize> = (0..n).collect();
+        by_id.sort_by_key(|&i| self.grains.id[i]);
+        let mut hash = Fnv::default();
+        for i in by_id {
+            for rows in [&self.grains.place, &self.grains.motion, &self.grains.turn] {
+                rows[i].iter().for_each(|x| hash.take(x.to_bits()));
+            }
+        }
+        let width = self.law.history();
+        let mut contacts: Vec<(u32, u32, usize)> = (0..self.reach.count)
+            .map(|k| {
+                let (i, j) = (self.reach.i[k] as usize, self.reach.j[k] as usize);
+                (self.grains.id[i], self.grains.id[j], k)
+            })
+            .collect();
+        contacts.sort_by_key(|&(a, b, _)| (a.min(b), a.max(b)));
+        for (a, b, k) in contacts {
+            let block = &self.reach.history[k / 4 * width..][..width];
+            // Pairs within reach that do not touch are an accident of the lists.
+            if block.iter().all(|row| row[k % 4] == 0.0) {
+                continue;
+            }
+            hash.take(u64::from(a) << 32 | u64::from(b));
+            block.iter().for_each(|row| hash.take(row[k % 4].to_bits()));
+        }
+        let mut walls: Vec<_> = self.plane_contacts.contacts.iter().collect();
+        walls.sort_by_key(|c| (self.grains.id[c.grain as usize], c.plane));
+        for c in walls.into_iter().filter(|c| c.history.iter().any(|&h| h != 0.0)) {
+            c.history.iter().for_each(|h| hash.take(h.to_bits()));
+        }
+        format!("{:016x}", hash.0)
+    }
+}
+
+/// FNV-1a on 64-bit words, byte by byte.
+struct Fnv(u64);
+
+impl Default for Fnv {
+    fn default() -> Self {
+        Fnv(0xcbf2_9ce4_8422_2325)
+    }
+}
+
+impl Fnv {
+    fn take(&mut self, word: u64) {
+        for byte in word.to_le_bytes() {
+            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
+        }
+    }
+}

@@ -1,0 +1,457 @@
+//! The simulation: one state, one step.
+
+use crate::contact::{ContactLaw, HISTORY_ROLLING, Interaction, Rolling, Sliding, Step};
+use crate::domain::Domain;
+use crate::forces::{self, Field};
+use crate::grains::Grains;
+use crate::motion::{self, Pull, RowResult};
+use crate::neighbours::Neighbours;
+use crate::planes::{Plane, PlaneContacts};
+use crate::reach::Reach;
+use crate::setup::{Setup, SetupError, Threads};
+use crate::snapshot::GrainSample;
+use nalgebra::Vector3;
+
+/// The grains flew apart: a position is no longer a number.
+#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[error(
+    "grain {grain} has left the range of numbers at t = {time:e} s: the time step of {timestep:e} s \
+     is too long for the stiffness and speeds of this scene"
+)]
+pub struct Diverged {
+    /// Number of the grain.
+    pub grain: u32,
+    /// When it was found [s].
+    pub time: f64,
+    /// The step [s].
+    pub timestep: f64,
+}
+
+/// Skin of the Verlet list, and reach beyond touching of the batches, in smallest-grain diameters.
+///
+/// Chosen by measurement on the inclined flow; they change speed only.
+const SKIN: f64 = 0.3;
+const REACH: f64 = 0.04;
+
+/// The law of the scene, ready for the inner loop.
+#[derive(Clone, Copy, Debug)]
+enum Kernel {
+    Sliding(Sliding),
+    Rolling(Rolling),
+}
+
+impl Kernel {
+    fn new(law: &ContactLaw) -> Kernel {
+        match &law.rolling {
+            None => Kernel::Sliding(Sliding::new(law)),
+            Some(shape) => Kernel::Rolling(Rolling::new(law, shape)),
+        }
+    }
+
+    fn slot_rows(&self) -> usize {
+        match self {
+            Kernel::Sliding(_) => forces::slot_rows::<Sliding>(),
+            Kernel::Rolling(_) => forces::slot_rows::<Rolling>(),
+        }
+    }
+}
+
+/// Histories of all batches and plane contacts.
+#[derive(Clone, Debug, Default)]
+struct Springs {
+    pairs: Vec<[f64; 4]>,
+    planes: Vec<[f64; HISTORY_ROLLING]>,
+    springs_current: bool,
+}
+
+/// Grains in motion.
+#[derive(Clone, Debug)]
+pub struct Simulation {
+    pub(crate) domain: Domain,
+    pub(crate) gravity: Vector3<f64>,
+    pub(crate) law: ContactLaw,
+    pub(crate) planes: Vec<Plane>,
+    pub(crate) timestep: f64,
+    kernel: Kernel,
+    parallel: bool,
+    skin: f64,
+    reach_skin: f64,
+    largest_radius: f64,
+    pub(crate) grains: Grains,
+    pub(crate) list: Neighbours,
+    pub(crate) reach: Reach,
+    pub(crate) plane_contacts: PlaneContacts,
+    row_results: Vec<RowResult>,
+    /// Momentum taken by fixed grains and planes since the start [N s].
+    pub(crate) impulse: [f64; 3],
+    /// Whether slots hold the forces of the present positions.
+    current: bool,
+    /// Whether springs are already stretched to the present positions.
+    pub(crate) springs_current: bool,
+    /// Springs before the forces of the present positions were looked at out of turn.
+    before: Springs,
+    pub(crate) steps: u64,
+    /// Steps since velocities were last given: the first kick after that is half a step.
+    pub(crate) steps_since_start: u64,
+    pub(crate) deepest: f64,
+    rebuilds: u64,
+}
+
+impl Simulation {
+    /// Checks a setup and makes it ready to step.
+    pub fn new(setup: Setup) -> Result<Simulation, SetupError> {
+        let mut simulation = Simulation::unlisted(setup)?;
+        simulation.rebuild();
+        Ok(simulation)
+    }
+
+    /// A simulation whose lists are still to be built or restored.
+    pub(crate) fn unlisted(setup: Setup) -> Result<Simulation, SetupError> {
+        let radii = || setup.grains.iter().map(|g| g.radius);
+        let smallest = radii().fold(f64::INFINITY, f64::min);
+        let largest_radius = radii().fold(0.0, f64::max);
+        let skin = SKIN * 2.0 * if smallest.is_finite() { smallest } else { 1.0 };
+        setup.validate(skin)?;
+        Ok(Simulation {
+            domain: setup.domain,
+            gravity: setup.gravity,
+            kernel: Kernel::new(&setup.law),
+            law: setup.law,
+            planes: setup.planes,
+            timestep: setup.timestep,
+            parallel: setup.threads == Threads::Rayon,
+            skin,
+            reach_skin: skin * REACH / SKIN,
+            largest_radius,
+            grains: Grains::new(&setup.grains),
+            list: Neighbours::default(),
+            reach: Reach::default(),
+            plane_contacts: PlaneContacts::default(),
+            row_results: Vec::new(),
+            impulse: [0.0; 3],
+            current: false,
+            springs_current: false,
+            before: Springs::default(),
+            steps: 0,
+            steps_since_start: 0,
+            deepest: 0.0,
+            rebuilds: 0,
+        })
+    }
+
+    /// Integrates `steps` steps.
+    pub fn advance(&mut self, steps: u64) -> Result<(), Diverged> {
+        for _ in 0..steps {
+            self.step()?;
+        }
+        Ok(())
+    }
+
+    fn step(&mut self) -> Result<(), Diverged> {
+        self.evaluate_forces();
+        let started = self.steps_since_start > 0;
+        let kick = if started { 1.0 } else { 0.5 } * self.timestep;
+        self.move_grains(kick);
+        self.steps += 1;
+        self.steps_since_start += 1;
+        self.current = false;
+        self.springs_current = false;
+        self.keep_lists()
+    }
+
+    /// Evaluates the forces of the present positions for an observer, remembering the springs as
+    /// they were: a checkpoint taken afterwards goes on with the same bits.
+    pub(crate) fn observe(&mut self) {
+        if self.current {
+            return;
+        }
+        self.before.pairs.clone_from(&self.reach.history);
+        self.before.planes.clear();
+        let walls = self.plane_contacts.contacts.iter();
+        self.before.planes.extend(walls.map(|c| c.history));
+        self.before.springs_current = self.springs_current;
+        self.evaluate_forces();
+    }
+
+    /// Takes back an observation's stretching of springs.
+    pub(crate) fn forget_observation(&mut self) {
+        if !self.current {
+            return;
+        }
+        std::mem::swap(&mut self.reach.history, &mut self.before.pairs);
+        let walls = self.plane_contacts.contacts.iter_mut();
+        for (contact, history) in walls.zip(&self.before.planes) {
+            contact.history = *history;
+        }
+        self.springs_current = self.before.springs_current;
+        self.current = false;
+    }
+
+    /// Forces of the present positions into the slots; springs stretch by the step just made.
+    fn evaluate_forces(&mut self) {
+        if self.current {
+            return;
+        }
+        let stretch = self.steps_since_start > 0 && !self.springs_current;
+        let step = Step {
+            length: self.timestep,
+            stretch: if stretch { self.timestep } else { 0.0 },
+        };
+        self.springs_current = true;
+        let deepest = match self.kernel {
+            Kernel::Sliding(law) => self.evaluate_law(&law, step),
+            Kernel::Rolling(law) => self.evaluate_law(&law, step),
+        };
+        self.deepest = self.deepest.max(deepest);
+        self.current = true;
+    }
+
+    fn evaluate_law<I: Interaction>(&mut self, law: &I, step: Step) -> f64 {
+        let field = Field {
+            place: &self.grains.place,
+            motion: &self.grains.motion,
+            turn: &self.grains.turn,
+            lengths: self.domain.lengths().into(),
+            inverse_lengths: self.inverse_lengths(),
+            lever: self.law.lever,
+            step,
+        };
+        let pairs = forces::evaluate(law, &self.grains, &field, &mut self.reach, self.parallel);
+        let walls =
+            self.plane_contacts
+                .evaluate(law, &self.planes, &self.grains, self.law.lever, step);
+        pairs.max(walls)
+    }
+
+    fn move_grains(&mut self, kick: f64) {
+        let g = self.gravity;
+        let pull = Pull {
+            reach: &self.reach,
+            planes: &self.plane_contacts,
+            slot_rows: self.slot_rows(),
+            gravity: [g.x, g.y, g.z, 0.0],
+            kick,
+            drift: self.timestep,
+        };
+        motion::advance(
+            &mut self.grains,
+            &self.list.rows,
+            &pull,
+            &mut self.row_results,
+            self.parallel,
+        );
+        for contact in &self.plane_contacts.contacts {
+            for k in 0..3 {
+                self.impulse[k] -= kick * contact.slot[0][k];
+            }
+        }
+        self.list.age += self.timestep;
+        self.reach.age += self.timestep;
+        for (r, row) in self.row_results.iter().enumerate() {
+            let travel = self.timestep * row.fluctuation;
+            self.list.travel[r] += travel;
+            self.reach.travel[r] += travel;
+        }
+    }
+
+    /// Renews the lists where grains may have outrun them.
+    fn keep_lists(&mut self) -> Result<(), Diverged> {
+        let list = &self.list;
+        let walls =
+            self.plane_contacts
+                .outdated(&self.planes, &list.rows, &list.travel, list.age);
+        if walls || list.outdated(self.skin) {
+            self.check_finite()?;
+            self.store_history();
+            self.rebuild();
+        } else if list.outdated_since(&self.reach.travel, self.reach.age, self.reach_skin) {
+            self.store_history();
+            self.renew_reach();
+        }
+        Ok(())
+    }
+
+    fn check_finite(&self) -> Result<(), Diverged> {
+        let n = self.grains.len();
+        let far = |x: &[f64; 4]| !x.iter().all(|c| c.abs() < 1e150);
+        match self.grains.place[..n].iter().position(far) {
+            None => Ok(()),
+            Some(i) => Err(Diverged {
+                grain: self.grains.id[i],
+                time: self.time(),
+                timestep: self.timestep,
+            }),
+        }
+    }
+
+    /// Brings the histories of the batches back into the Verlet list.
+    pub(crate) fn store_history(&mut self) {
+        self.reach
+            .store_history(&mut self.list, self.law.history());
+    }
+
+    fn rebuild(&mut self) {
+        self.fold_impulses();
+        let width = self.law.history();
+        self.list.build(
+            &mut self.grains,
+            &self.domain,
+            self.largest_radius,
+            self.skin,
+            width,
+            self.parallel,
+        );
+        let list = &self.list;
+        self.plane_contacts.build(
+            &self.planes,
+            &self.grains,
+            &list.rows,
+            self.skin,
+            |old| list.new_index(old),
+        );
+        self.renew_rows();
+        self.renew_reach();
+        self.rebuilds += 1;
+    }
+
+    /// Makes room for what the motion pass leaves for each row.
+    pub(crate) fn renew_rows(&mut self) {
+        self.row_results.clear();
+        self.row_results
+            .resize(self.list.rows.len(), RowResult::default());
+    }
+
+    pub(crate) fn renew_reach(&mut self) {
+        self.reach.build(
+            &self.grains,
+            &self.list,
+            self.domain.lengths().into(),
+            self.inverse_lengths(),
+            self.reach_skin,
+            self.law.history(),
+            self.slot_rows(),
+        );
+        self.current = false;
+    }
+
+    /// Adds the rows' impulses to the total, in row order.
+    pub(crate) fn fold_impulses(&mut self) {
+        for row in &mut self.row_results {
+            for k in 0..3 {
+                self.impulse[k] += row.impulse[k];
+            }
+            row.impulse = [0.0; 3];
+        }
+    }
+
+    /// Rows of a contact's slot under the scene's law.
+    pub(crate) fn slot_rows(&self) -> usize {
+        self.kernel.slot_rows()
+    }
+
+    fn inverse_lengths(&self) -> [f64; 3] {
+        let l = self.domain.lengths();
+        std::array::from_fn(|k| {
+            if self.domain.periodic[k] {
+                1.0 / l[k]
+            } else {
+                0.0
+            }
+        })
+    }
+
+    /// Sets the velocities of all free grains; spins and contacts stay.
+    pub fn give_velocity(&mut self, mut f: impl FnMut(&GrainSample) -> Vector3<f64>) {
+        let samples = self.samples();
+        for (i, sample) in samples.iter().enumerate() {
+            if sample.fixed {
+                continue;
+            }
+            let (v, s) = (f(sample), sample.spin * sample.radius);
+            self.grains.motion[i][..3].copy_from_slice(v.as_slice());
+            self.grains.turn[i][..3].copy_from_slice(s.as_slice());
+        }
+        self.restart_motion();
+    }
+
+    /// Holds still every free grain for which `f` says so; it becomes part of the walls.
+    pub fn fix(&mut self, mut f: impl FnMut(&GrainSample) -> bool) {
+        let samples = self.samples();
+        let mut any = false;
+        for (i, sample) in samples.iter().enumerate() {
+            if !sample.fixed && f(sample) {
+                self.grains.motion[i] = [0.0; 4];
+                self.grains.turn[i][..3].fill(0.0);
+                any = true;
+            }
+        }
+        if any {
+            // The row's drift was the mean of other velocities: let the bound start afresh.
+            self.store_history();
+            self.rebuild();
+        }
+    }
+
+    /// Velocities now belong to the time of the positions, not to half a step before.
+    fn restart_motion(&mut self) {
+        self.steps_since_start = 0;
+        self.store_history();
+        self.rebuild();
+    }
+
+    /// Time since the start [s].
+    pub fn time(&self) -> f64 {
+        self.steps as f64 * self.timestep
+    }
+
+    /// Steps since the start.
+    pub fn steps_done(&self) -> u64 {
+        self.steps
+    }
+
+    /// Length of a step [s].
+    pub fn timestep(&self) -> f64 {
+        self.timestep
+    }
+
+    /// The box.
+    pub fn domain(&self) -> &Domain {
+        &self.domain
+    }
+
+    /// The contact law.
+    pub fn law(&self) -> &ContactLaw {
+        &self.law
+    }
+
+    /// Acceleration of gravity [m/s²].
+    pub fn gravity(&self) -> Vector3<f64> {
+        self.gravity
+    }
+
+    /// Changes gravity from the next step on.
+    pub fn set_gravity(&mut self, gravity: Vector3<f64>) {
+        self.gravity = gravity;
+    }
+
+    /// Number of grains, fixed ones included.
+    pub fn grain_count(&self) -> usize {
+        self.grains.len()
+    }
+
+    /// Largest overlap of any contact since the start, over twice its reduced radius
+    /// (the radius, for equal grains).
+    pub fn largest_overlap(&self) -> f64 {
+        self.deepest
+    }
+
+    /// How often the Verlet list was built.
+    pub fn list_builds(&self) -> u64 {
+        self.rebuilds
+    }
+
+    /// Shares steps out over the current rayon pool, or not. The results are the same bits.
+    pub fn set_threads(&mut self, threads: Threads) {
+        self.parallel = threads == Threads::Rayon;
+    }
+}

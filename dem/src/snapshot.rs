@@ -1,0 +1,82 @@
+//! What an observer sees of the grains at one instant: the input of coarse-graining and of output.
+
+use crate::domain::Domain;
+use nalgebra::Vector3;
+
+/// A grain at one instant; velocities belong to the same time as the position.
+#[derive(Clone, Copy, Debug)]
+pub struct GrainSample {
+    /// Number the grain was given at the start; it never changes.
+    pub id: u32,
+    /// Centre [m], inside the box along periodic axes.
+    pub position: Vector3<f64>,
+    /// Velocity of the centre [m/s].
+    pub velocity: Vector3<f64>,
+    /// Angular velocity [rad/s].
+    pub spin: Vector3<f64>,
+    /// Radius [m].
+    pub radius: f64,
+    /// Mass [kg]; the true mass, also for fixed grains.
+    pub mass: f64,
+    /// Held in place: part of a wall or a rough base.
+    pub fixed: bool,
+}
+
+/// Who a grain touches.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Partner {
+    /// Index into [`Snapshot::grains`].
+    Grain(usize),
+    /// Index of the plane wall.
+    Plane(usize),
+}
+
+/// A contact at one instant. Each pair appears once.
+#[derive(Clone, Copy, Debug)]
+pub struct ContactSample {
+    /// Index of the grain the force acts on, into [`Snapshot::grains`].
+    pub grain: usize,
+    /// The other side; it feels the opposite force.
+    pub partner: Partner,
+    /// Overlap, positive when pressed together [m].
+    pub overlap: f64,
+    /// Force on `grain` [N].
+    pub force: Vector3<f64>,
+    /// From the centre of `grain` to the contact point [m].
+    pub arm: Vector3<f64>,
+    /// From the centre of `partner` to the contact point [m]; zero for a wall.
+    ///
+    /// `arm - partner_arm` is the branch vector from `grain` to `partner`, nearest image.
+    pub partner_arm: Vector3<f64>,
+}
+
+/// All grains and contacts at one instant. Reuse one value: its buffers are kept.
+#[derive(Clone, Debug)]
+pub struct Snapshot {
+    /// Time [s].
+    pub time: f64,
+    /// The box.
+    pub domain: Domain,
+    /// Acceleration of gravity [m/s²].
+    pub gravity: Vector3<f64>,
+    /// All grains, fixed ones included.
+    pub grains: Vec<GrainSample>,
+    /// All touching contacts.
+    pub contacts: Vec<ContactSample>,
+}
+
+impl Default for Snapshot {
+    fn default() -> Self {
+        Snapshot {
+            time: 0.0,
+            domain: Domain {
+                lower: Vector3::zeros(),
+                upper: Vector3::zeros(),
+                periodic: [false; 3],
+            },
+            gravity: Vector3::zeros(),
+            grains: Vec::new(),
+            contacts: Vec::new(),
+        }
+    }
+}
