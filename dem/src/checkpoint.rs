@@ -64,7 +64,11 @@ impl Simulation {
         let ends: Vec<u32> = self.list.rows.iter().map(|r| r.end).collect();
         counts("list/row_end", wide(&ends));
         counts("list/cells", self.list.cells().map(|c| c as u64).to_vec());
-        let of: Vec<u32> = walls.contacts.iter().flat_map(|c| [c.grain, c.plane]).collect();
+        let of: Vec<u32> = walls
+            .contacts
+            .iter()
+            .flat_map(|c| [c.grain, c.plane])
+            .collect();
         counts("planes/contact", wide(&of));
         counts(
             "steps",
@@ -93,7 +97,10 @@ impl Simulation {
             if values.len() == len {
                 Ok(values)
             } else {
-                Err(format!("array `{name}` has {} numbers, expected {len}", values.len()))
+                Err(format!(
+                    "array `{name}` has {} numbers, expected {len}",
+                    values.len()
+                ))
             }
         };
         let mut grains = Grains {
@@ -121,7 +128,11 @@ impl Simulation {
         self.list.history = sized("list/history", width * partner.len())?.to_vec();
         let ends = narrow(record.counts("list/row_end")?);
         let drifts: Vec<[f64; 3]> = rows(sized("list/row_drift", 3 * ends.len())?);
-        let cells: Vec<usize> = record.counts("list/cells")?.iter().map(|&c| c as usize).collect();
+        let cells: Vec<usize> = record
+            .counts("list/cells")?
+            .iter()
+            .map(|&c| c as usize)
+            .collect();
         let [nx, ny, nz] = cells[..] else {
             return Err("array `list/cells` must have 3 numbers".into());
         };

@@ -27,7 +27,7 @@ mod simulation;
 mod snapshot;
 pub mod timestep;
 
-pub use contact::{ContactLaw, DashpotSampling, Hooke, Lever, ShapeParameter, TangentialSpring};
+pub use contact::{ContactLaw, Hooke, Lever, ShapeParameter, TangentialSpring};
 pub use domain::Domain;
 pub use energy::Energy;
 pub use grains::Grain;

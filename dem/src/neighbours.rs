@@ -355,8 +355,7 @@ impl Neighbours {
             b.carried_first[i + 1] += b.carried_first[i];
         }
         b.carried_sorted.clear();
-        b.carried_sorted
-            .resize(b.carried.len(), Carried::default());
+        b.carried_sorted.resize(b.carried.len(), Carried::default());
         // Fill from the back of each bucket, which leaves `carried_first` at the bucket's start.
         for c in b.carried.iter().rev() {
             let at = &mut b.carried_first[c.i as usize + 1];
@@ -428,6 +427,7 @@ fn search_rows(
                 let before = part.partner.len();
                 let xi = &grains.place[i as usize];
                 let reach = xi[3] + skin;
+                let held = grains.motion[i as usize][3] == 0.0;
                 for &z in zs.iter() {
                     for &y in ys.iter() {
                         for &xc in xs.iter() {
@@ -442,7 +442,9 @@ fn search_rows(
                                     r2 += d * d;
                                 }
                                 let near = reach + xj[3];
-                                if r2 < near * near {
+                                // Two fixed grains have nothing to say to each other.
+                                let idle = held && grains.motion[j as usize][3] == 0.0;
+                                if r2 < near * near && !idle {
                                     part.partner.push(j);
                                 }
                             }

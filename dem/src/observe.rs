@@ -129,7 +129,12 @@ impl Simulation {
                 .iter()
                 .map(|row| row[k % 4])
                 .collect();
-            self.add_elastic(&mut energy, a[3] + b[3] - apart, a[3] * b[3] / (a[3] + b[3]), &history);
+            self.add_elastic(
+                &mut energy,
+                a[3] + b[3] - apart,
+                a[3] * b[3] / (a[3] + b[3]),
+                &history,
+            );
         }
         for contact in &self.plane_contacts.contacts {
             let i = contact.grain as usize;
@@ -228,7 +233,10 @@ impl Simulation {
         }
         let mut walls: Vec<_> = self.plane_contacts.contacts.iter().collect();
         walls.sort_by_key(|c| (self.grains.id[c.grain as usize], c.plane));
-        for c in walls.into_iter().filter(|c| c.history.iter().any(|&h| h != 0.0)) {
+        for c in walls
+            .into_iter()
+            .filter(|c| c.history.iter().any(|&h| h != 0.0))
+        {
             c.history.iter().for_each(|h| hash.take(h.to_bits()));
         }
         format!("{:016x}", hash.0)

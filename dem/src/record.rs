@@ -24,7 +24,11 @@ impl Record {
 
     /// The part that was inserted under `prefix/`.
     pub fn extract(&self, prefix: &str) -> Record {
-        let cut = |name: &String| name.strip_prefix(prefix)?.strip_prefix('/').map(String::from);
+        let cut = |name: &String| {
+            name.strip_prefix(prefix)?
+                .strip_prefix('/')
+                .map(String::from)
+        };
         Record {
             numbers: self
                 .numbers

@@ -138,15 +138,15 @@ impl Setup {
         }
         let mut largest: f64 = 0.0;
         for (k, g) in self.grains.iter().enumerate() {
-            check(
-                &format!("grains[{k}].radius"),
-                g.radius,
-                "> 0 m",
-                |v| v > 0.0,
-            )?;
-            check(&format!("grains[{k}].density"), g.density, "> 0 kg/m³", |v| {
+            check(&format!("grains[{k}].radius"), g.radius, "> 0 m", |v| {
                 v > 0.0
             })?;
+            check(
+                &format!("grains[{k}].density"),
+                g.density,
+                "> 0 kg/m³",
+                |v| v > 0.0,
+            )?;
             for (name, v) in [
                 ("position", &g.position),
                 ("velocity", &g.velocity),

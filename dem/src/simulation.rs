@@ -194,7 +194,6 @@ impl Simulation {
         }
         let stretch = self.steps_since_start > 0 && !self.springs_current;
         let step = Step {
-            length: self.timestep,
             stretch: if stretch { self.timestep } else { 0.0 },
         };
         self.springs_current = true;
@@ -257,9 +256,9 @@ impl Simulation {
     /// Renews the lists where grains may have outrun them.
     fn keep_lists(&mut self) -> Result<(), Diverged> {
         let list = &self.list;
-        let walls =
-            self.plane_contacts
-                .outdated(&self.planes, &list.rows, &list.travel, list.age);
+        let walls = self
+            .plane_contacts
+            .outdated(&self.planes, &list.rows, &list.travel, list.age);
         if walls || list.outdated(self.skin) {
             self.check_finite()?;
             self.store_history();
@@ -286,8 +285,7 @@ impl Simulation {
 
     /// Brings the histories of the batches back into the Verlet list.
     pub(crate) fn store_history(&mut self) {
-        self.reach
-            .store_history(&mut self.list, self.law.history());
+        self.reach.store_history(&mut self.list, self.law.history());
     }
 
     fn rebuild(&mut self) {
@@ -302,13 +300,10 @@ impl Simulation {
             self.parallel,
         );
         let list = &self.list;
-        self.plane_contacts.build(
-            &self.planes,
-            &self.grains,
-            &list.rows,
-            self.skin,
-            |old| list.new_index(old),
-        );
+        self.plane_contacts
+            .build(&self.planes, &self.grains, &list.rows, self.skin, |old| {
+                list.new_index(old)
+            });
         self.renew_rows();
         self.renew_reach();
         self.rebuilds += 1;

@@ -29,7 +29,10 @@ pub fn stability_limit(law: &ContactLaw, mass: f64) -> f64 {
     let k_t = law.tangential.stiffness(&law.normal);
     // Tangential: 1/m + R²/I = 7/(2m). Rolling about a wall: k_n (βR)² over 2/5 m R².
     let beta2 = law.rolling.map_or(0.0, |s| s.beta * s.beta);
-    let stiffest = k_n.max(3.5 * k_t).max(2.5 * k_n * beta2).max(2.5 * 2.0 * k_t * beta2);
+    let stiffest = k_n
+        .max(3.5 * k_t)
+        .max(2.5 * k_n * beta2)
+        .max(2.5 * 2.0 * k_t * beta2);
     2.0 * (mass / stiffest).sqrt()
 }
 
@@ -64,7 +67,6 @@ mod tests {
             },
             rolling: None,
             lever: Default::default(),
-            dashpot: Default::default(),
         };
         assert!((stability_limit(&law, 1.0) - 0.1).abs() < 1e-15);
     }

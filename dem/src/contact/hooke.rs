@@ -10,15 +10,12 @@
 //! in the last moments of a contact, where the dashpot outweighs the spring and pulls: ε_n and τ
 //! above belong to the unclamped law.
 //!
-//! **Steps of finite length.** A leap-frog step applies the dashpot with the velocity half a step
-//! old, and over whole steps only, although a contact begins and ends within one. Two corrections
-//! make the restitution second order in the step (`Fitted`):
-//! * the amplitude of the free oscillation shrinks by exactly `exp(-C dt/2m)` a step when the
-//!   coefficient is multiplied by `(1 - e^{-y})/y`, y = C_n dt/m;
-//! * where the overlap is less than one step's travel, the dashpot counts for the part of the
-//!   neighbouring steps in which the surfaces touch, `1/2 + x/(|v| dt)`.
+//! **Steps of finite length.** The leap-frog step takes the dashpot's velocity half a step back and
+//! counts whole steps only, although a contact begins and ends within one: at N steps a contact the
+//! restitution is off by up to 0.4/N (ε_n = 0.5), first order, as in other codes that use this scheme.
+//! Scaling both terms to the step, `(1 - e^{-y})/y` with y = C_n dt/m, would make it second order but
+//! soften resting contacts by y/2; it is not done.
 
-use super::Step;
 use crate::lanes::Lane;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -44,11 +41,10 @@ impl Hooke {
         (reduced_mass * (PI * PI + ln * ln) / self.stiffness).sqrt()
     }
 
-    pub(super) fn coefficients(&self, fitted: bool) -> Coefficients {
+    pub(super) fn coefficients(&self) -> Coefficients {
         Coefficients {
             stiffness: self.stiffness,
             damping_factor: self.damping_factor(),
-            fitted,
         }
     }
 }
@@ -59,41 +55,18 @@ pub(super) fn damping_factor(stiffness: f64, restitution: f64) -> f64 {
     -2.0 * ln * (stiffness / (PI * PI + ln * ln)).sqrt()
 }
 
-/// `(1 - e^{-y})/y` to 1e-4 for y ≤ 0.5, and between 0 and 1 for every y > 0.
-#[inline(always)]
-pub(super) fn fitted_to_step<L: Lane>(y: L) -> L {
-    let one = L::splat(1.0);
-    // y/(1 - e^{-y}) = 1 + y/2 + y²/12 - …: its reciprocal stays positive for any step.
-    one / (one + y * (L::splat(0.5) + y * L::splat(1.0 / 12.0)))
-}
-
 /// The law in the inner loop.
 #[derive(Clone, Copy, Debug)]
 pub struct Coefficients {
     stiffness: f64,
     damping_factor: f64,
-    fitted: bool,
 }
 
 impl Coefficients {
     /// Normal force, positive when it pushes apart [N].
     #[inline(always)]
-    pub fn force<L: Lane>(&self, overlap: L, approach: L, inverse_mass: L, step: Step) -> L {
-        let one = L::splat(1.0);
-        // C/m = factor/√m, since C = factor·√m.
-        let root = inverse_mass.sqrt();
-        let mut damping = L::splat(self.damping_factor) / root;
-        if self.fitted {
-            let dt = L::splat(step.length);
-            let y = L::splat(self.damping_factor) * root * dt;
-            let travel = approach.abs() * dt;
-            let part = L::select(
-                overlap.less(travel),
-                L::splat(0.5) + overlap / travel,
-                one,
-            );
-            damping = damping * fitted_to_step(y) * part;
-        }
+    pub fn force<L: Lane>(&self, overlap: L, approach: L, inverse_mass: L) -> L {
+        let damping = L::splat(self.damping_factor) / inverse_mass.sqrt();
         L::splat(self.stiffness) * overlap + damping * approach
     }
 }
@@ -102,19 +75,15 @@ impl Coefficients {
 mod tests {
     use super::*;
 
-    /// Head-on impact of a unit reduced mass, leap-frog, phase of first touch `offset` of a step.
-    fn restitution(law: Hooke, steps_per_contact: f64, offset: f64, fitted: bool) -> (f64, f64) {
+    /// Head-on impact of a unit reduced mass, leap-frog, phase of first touch `offset` of a step:
+    /// restitution and duration.
+    fn impact(law: Hooke, steps_per_contact: f64, offset: f64) -> (f64, f64) {
         let dt = law.contact_time(1.0) / steps_per_contact;
-        let step = Step {
-            length: dt,
-            stretch: dt,
-        };
-        let c = law.coefficients(fitted);
-        let (mut gap, mut v) = (offset * dt, -1.0);
-        let mut touching = 0.0;
+        let c = law.coefficients();
+        let (mut gap, mut v, mut touching) = (offset * dt, -1.0, 0.0);
         loop {
             if gap < 0.0 {
-                v += dt * c.force(-gap, -v, 1.0, step);
+                v += dt * c.force(-gap, -v, 1.0);
                 touching += dt;
             } else if v > 0.0 {
                 return (v, touching);
@@ -131,41 +100,26 @@ mod tests {
                 restitution: e,
             };
             for offset in [0.01, 0.37, 0.99] {
-                let (out, time) = restitution(law, 1000.0, offset, true);
-                assert!((out - e).abs() < 1e-4, "e {e}: {out}");
+                let (out, time) = impact(law, 2000.0, offset);
+                assert!((out - e).abs() < 1e-3, "e {e}: {out}");
                 assert!((time / law.contact_time(1.0) - 1.0).abs() < 2e-3);
             }
         }
     }
 
-    /// Worst error of the restitution over the phase of first touch.
-    fn worst(steps: f64, fitted: bool) -> f64 {
+    #[test]
+    fn the_step_s_error_is_first_order_and_as_stated() {
         let law = Hooke {
             stiffness: 1.0,
             restitution: 0.5,
         };
-        (0..50)
-            .map(|k| (restitution(law, steps, (k as f64 + 0.5) / 50.0, fitted).0 - 0.5).abs())
-            .fold(0.0, f64::max)
-    }
-
-    #[test]
-    fn fitted_dashpot_is_second_order_and_the_plain_one_first() {
-        let fitted = (worst(30.0, true) / worst(120.0, true)).log(4.0);
-        let plain = (worst(30.0, false) / worst(120.0, false)).log(4.0);
-        assert!(fitted > 1.7, "fitted {fitted}, error {:e}", worst(30.0, true));
-        assert!((0.7..1.4).contains(&plain), "plain {plain}");
-        // At the usual 30 steps a contact.
-        assert!(worst(30.0, true) < 3e-3, "{:e}", worst(30.0, true));
-        assert!(worst(30.0, false) > 1e-2, "{:e}", worst(30.0, false));
-    }
-
-    #[test]
-    fn step_factor_is_the_exponential_mean() {
-        for y in [1e-3_f64, 0.05, 0.2, 0.5] {
-            let exact = (1.0 - (-y).exp()) / y;
-            assert!((fitted_to_step(y) - exact).abs() < 1e-4);
-        }
-        assert!(fitted_to_step(50.0) > 0.0);
+        let worst = |steps: f64| {
+            (0..50)
+                .map(|k| (impact(law, steps, (k as f64 + 0.5) / 50.0).0 - 0.5).abs())
+                .fold(0.0, f64::max)
+        };
+        let order = (worst(30.0) / worst(240.0)).log(8.0);
+        assert!((0.9..1.1).contains(&order), "{order}");
+        assert!(worst(30.0) < 0.4 / 30.0);
     }
 }

@@ -11,8 +11,8 @@ pub mod tangential;
 
 use crate::lanes::{Lane, Vec3};
 pub use hooke::Hooke;
-pub use shape_springs::ShapeParameter;
 use serde::{Deserialize, Serialize};
+pub use shape_springs::ShapeParameter;
 pub use tangential::TangentialSpring;
 
 /// Where the contact point lies on the line of centres.
@@ -28,18 +28,6 @@ pub enum Lever {
     Radius,
 }
 
-/// How the dashpots are sampled by a step of finite length.
-#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum DashpotSampling {
-    /// The coefficient is fitted to the step and the first and last step of a contact count for the
-    /// time they really touch (see [`hooke`]): restitution is right to second order in the step.
-    #[default]
-    Fitted,
-    /// Force at the step's start times the whole step, as other codes do: first order.
-    Plain,
-}
-
 /// Contact law of a scene: linear springs and dashpots (Thuillet 2019, Eq. 2.1–2.13).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ContactLaw {
@@ -51,8 +39,6 @@ pub struct ContactLaw {
     pub rolling: Option<ShapeParameter>,
     /// Lever arm of the tangential force.
     pub lever: Lever,
-    /// Sampling of the dashpots.
-    pub dashpot: DashpotSampling,
 }
 
 /// Numbers of history a contact carries: tangential spring (3), rolling spring (3), twist (1).
@@ -107,8 +93,6 @@ pub struct Wrench<L> {
 /// Everything about a step that a law needs.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
-    /// Length of the step [s].
-    pub length: f64,
     /// Time by which springs are stretched at this evaluation [s]: the step, or 0 at the first
     /// evaluation of a run, when no time has passed yet.
     pub stretch: f64,
@@ -146,10 +130,9 @@ pub struct Rolling {
 impl Sliding {
     /// Coefficients of a scene's law.
     pub fn new(law: &ContactLaw) -> Self {
-        let fitted = law.dashpot == DashpotSampling::Fitted;
         Sliding {
-            normal: law.normal.coefficients(fitted),
-            tangential: law.tangential.coefficients(&law.normal, fitted),
+            normal: law.normal.coefficients(),
+            tangential: law.tangential.coefficients(&law.normal),
         }
     }
 }
@@ -178,7 +161,7 @@ impl Interaction for Sliding {
         let approach = -touch.velocity.dot(touch.normal);
         let normal = self
             .normal
-            .force(touch.overlap, approach, touch.inverse_mass, step);
+            .force(touch.overlap, approach, touch.inverse_mass);
         let spring = Vec3([history[0], history[1], history[2]]);
         let (tangential, spring) = self.tangential.force(touch, spring, normal.abs(), step);
         history[..3].copy_from_slice(&spring.0);

@@ -147,10 +147,7 @@ mod tests {
         }
     }
 
-    const STEP: Step = Step {
-        length: 1e-3,
-        stretch: 1e-3,
-    };
+    const STEP: Step = Step { stretch: 1e-3 };
 
     #[test]
     fn stiffness_and_limits_are_those_of_the_thesis() {
@@ -164,7 +161,10 @@ mod tests {
 
         let (m, ..) = springs(beta).moment(&touch([1e6, 0.0, 1e6]), Vec3::zero(), 0.0, 2.0, STEP);
         assert!((m.0[0] + 1.05 * beta * 0.5 * 2.0).abs() < 1e-12);
-        assert!((m.0[2] + 1.3 * beta * 0.5 * 0.5 * 2.0).abs() < 1e-12, "μ stands in the twist");
+        assert!(
+            (m.0[2] + 1.3 * beta * 0.5 * 0.5 * 2.0).abs() < 1e-12,
+            "μ stands in the twist"
+        );
     }
 
     #[test]

@@ -74,7 +74,9 @@ mod tests {
     fn no_path_takes_out_more_than_was_put_in() {
         let mut seed = 17_u64;
         let mut random = || {
-            seed = seed.wrapping_mul(6364136223846793005).wrapping_add(1442695040888963407);
+            seed = seed
+                .wrapping_mul(6364136223846793005)
+                .wrapping_add(1442695040888963407);
             (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
         };
         let (k, c, dt) = (40.0, 0.7, 1e-4);

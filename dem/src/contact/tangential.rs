@@ -9,7 +9,7 @@
 //! only a way to name C_t (1 = no dashpot), m the reduced mass. Source: Thuillet 2019, Eq. 2.2, 2.4,
 //! 2.5, 2.10. The limit acts as [`super::slider`] says.
 
-use super::hooke::{Hooke, damping_factor, fitted_to_step};
+use super::hooke::{Hooke, damping_factor};
 use super::slider::slide;
 use super::{Step, Touch};
 use crate::lanes::{Lane, Vec3};
@@ -37,12 +37,11 @@ impl TangentialSpring {
         damping_factor(self.stiffness(normal), self.restitution)
     }
 
-    pub(super) fn coefficients(&self, normal: &Hooke, fitted: bool) -> Coefficients {
+    pub(super) fn coefficients(&self, normal: &Hooke) -> Coefficients {
         Coefficients {
             stiffness: self.stiffness(normal),
             damping_factor: self.damping_factor(normal),
             friction: self.friction,
-            fitted,
         }
     }
 }
@@ -53,11 +52,7 @@ pub struct Coefficients {
     stiffness: f64,
     damping_factor: f64,
     friction: f64,
-    fitted: bool,
 }
-
-/// Slip at the contact is resisted by 2/7 of the reduced mass: spheres also turn.
-const INVERSE_SLIP_MASS: f64 = 3.5;
 
 impl Coefficients {
     /// Force on `i` and the spring's new displacement.
@@ -71,12 +66,7 @@ impl Coefficients {
     ) -> (Vec3<L>, Vec3<L>) {
         let slip = touch.velocity.reject(touch.normal);
         let stretched = (spring + slip.scale(L::splat(step.stretch))).reject(touch.normal);
-        let root = touch.inverse_mass.sqrt();
-        let mut damping = L::splat(self.damping_factor) / root;
-        if self.fitted {
-            let y = L::splat(INVERSE_SLIP_MASS * self.damping_factor * step.length) * root;
-            damping = damping * fitted_to_step(y);
-        }
+        let damping = L::splat(self.damping_factor) / touch.inverse_mass.sqrt();
         let (resistance, left) = slide(
             stretched,
             slip,
@@ -113,29 +103,29 @@ mod tests {
             restitution: 1.0,
             friction,
         }
-        .coefficients(&normal, true)
+        .coefficients(&normal)
     }
 
     #[test]
     fn opposes_slip_and_stops_at_coulomb() {
-        let step = Step {
-            length: 1e-3,
-            stretch: 1e-3,
-        };
+        let step = Step { stretch: 1e-3 };
         let (f, s) = spring(10.0).force(&touch([1.0, 0.0, -5.0]), Vec3::zero(), 1.0, step);
-        assert!((f.0[0] + 200.0 * 1e-3).abs() < 1e-15, "k_t S = 0.2 N against the slip");
+        assert!(
+            (f.0[0] + 200.0 * 1e-3).abs() < 1e-15,
+            "k_t S = 0.2 N against the slip"
+        );
         assert_eq!((f.0[2], s.0[2]), (0.0, 0.0));
         let (f, s) = spring(0.1).force(&touch([1.0, 0.0, 0.0]), Vec3::zero(), 1.0, step);
         assert!((f.0[0] + 0.1).abs() < 1e-15);
-        assert!((s.0[0] - 0.1 / 200.0).abs() < 1e-15, "the spring keeps what friction can hold");
+        assert!(
+            (s.0[0] - 0.1 / 200.0).abs() < 1e-15,
+            "the spring keeps what friction can hold"
+        );
     }
 
     #[test]
     fn no_time_no_stretch() {
-        let step = Step {
-            length: 1e-3,
-            stretch: 0.0,
-        };
+        let step = Step { stretch: 0.0 };
         let (_, s) = spring(1.0).force(&touch([1.0, 0.0, 0.0]), Vec3::zero(), 1.0, step);
         assert_eq!(s.0, [0.0; 3]);
     }

@@ -157,8 +157,7 @@ fn loose_cloud(spec: &InclineBed, time_unit: f64) -> (Domain, Vec<Grain>) {
                 ((at / columns) as f64 + 0.5) * dy + jitter(room),
                 (layer as f64 + 0.5) * spacing + jitter(room),
             );
-            let velocity =
-                Vector3::from_fn(|_, _| 2.0 * speed * (random.random::<f64>() - 0.5));
+            let velocity = Vector3::from_fn(|_, _| 2.0 * speed * (random.random::<f64>() - 0.5));
             let radius = spec.radius.draw(&mut random);
             Grain {
                 velocity,
@@ -267,7 +266,6 @@ mod tests {
                     twisting_friction: 1.3,
                 }),
                 lever: Default::default(),
-                dashpot: Default::default(),
             },
             gravity: 1.0,
             timestep: 5e-4,
@@ -277,8 +275,12 @@ mod tests {
 
     #[test]
     fn a_bed_settles_densely_on_a_rough_base() {
-        let bed = settle_incline_bed(&spec(3), Threads::Serial, &mut |_| ControlFlow::Continue(()))
-            .unwrap();
+        let bed = settle_incline_bed(
+            &spec(3),
+            Threads::Serial,
+            &mut |_| ControlFlow::Continue(()),
+        )
+        .unwrap();
         let report = bed.report;
         assert_eq!(report.grains, 300);
         assert!(report.kinetic_energy < AT_REST, "{report:?}");

@@ -43,9 +43,12 @@ impl RadiusLaw {
                     "in [0, 0.5]",
                     |v| (0.0..=0.5).contains(&v),
                 )?;
-                check("grains.cut_deviations", cut, "> 0, and cut · deviation < 1", |v| {
-                    v > 0.0 && v * relative_deviation < 1.0
-                })
+                check(
+                    "grains.cut_deviations",
+                    cut,
+                    "> 0, and cut · deviation < 1",
+                    |v| v > 0.0 && v * relative_deviation < 1.0,
+                )
             }
             RadiusLaw::Uniform { low, high } => {
                 check("grains.smallest_radius", low, "> 0 m", |v| v > 0.0)?;
