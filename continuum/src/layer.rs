@@ -1,0 +1,247 @@
+//! A layer of material between two plane boundaries, brought from rest to a steady state: what
+//! the cases with exact solutions have in common.
+
+use std::ops::ControlFlow;
+
+use serde::{Deserialize, Serialize};
+
+use crate::discretisation::ThresholdPressure;
+use crate::error::{Error, require};
+use crate::flow::{Flow, Marching, StepRecord, YieldMethod};
+use crate::grid::{Axis, Boundary, DIMENSIONS, Grid};
+use crate::rheology::{MuI, Rheology};
+use crate::units::Units;
+
+/// Settings of a computation, in natural units of the case (time √(H/g) in a layer of depth H).
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct Options {
+    /// Time stepping and the test for a steady state.
+    pub marching: Marching,
+    /// The method of a time step.
+    pub method: YieldMethod,
+    /// Where the pressure of the threshold is taken.
+    pub threshold_pressure: ThresholdPressure,
+}
+
+/// State of a computation under way.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize)]
+pub struct Progress {
+    /// Steps made.
+    pub step: usize,
+    /// Time (s).
+    pub time: f64,
+    /// Last time step (s).
+    pub dt: f64,
+    /// Mean velocity (m/s).
+    pub mean_velocity: f64,
+    /// Largest acceleration over the acceleration that counts as steady.
+    pub distance_to_steady: f64,
+}
+
+/// A steady flow across a layer with its exact solution; SI units unless said.
+#[derive(Debug, Clone, PartialEq, Serialize)]
+pub struct LayerSolution {
+    /// Positions of cell centres across the layer (m).
+    pub z: Vec<f64>,
+    /// Velocity (m/s).
+    pub u: Vec<f64>,
+    /// Pressure (Pa).
+    pub p: Vec<f64>,
+    /// Exact velocity at the same positions (m/s).
+    pub exact_u: Vec<f64>,
+    /// Exact pressure at the same positions (Pa).
+    pub exact_p: Vec<f64>,
+    /// √(Σ(u − u_exact)²/Σ u_exact²); the absolute root mean square (m/s) where the exact velocity
+    /// is zero.
+    pub velocity_error_l2_relative: f64,
+    /// max|u − u_exact|/max|u_exact|, likewise.
+    pub velocity_error_max_relative: f64,
+    /// √(Σ(p − p_exact)²/Σ p_exact²).
+    pub pressure_error_l2_relative: f64,
+    /// Largest speed on any face (m/s).
+    pub max_speed: f64,
+    /// Shear stress on the low and on the high side of the layer (Pa): τ_xz, positive where u
+    /// grows with z.
+    pub boundary_shear_stress: [f64; 2],
+    /// Volume fraction that has yielded.
+    pub yielded_fraction: f64,
+    /// Volume fraction that has yielded where the equations are ill posed.
+    pub ill_posed_fraction: f64,
+    /// Largest difference of velocity between the columns of a periodic grid (m/s).
+    pub spread_along_x: f64,
+    /// Number of steps.
+    pub steps: usize,
+    /// Linear systems solved.
+    pub linear_solves: usize,
+    /// Number of cells.
+    pub cells: usize,
+    /// Every step: times in s, velocities in m/s, accelerations in m/s², residuals in natural
+    /// units.
+    pub history: Vec<StepRecord>,
+    /// The natural units of the computation.
+    pub units: Units,
+}
+
+/// A layer to compute; lengths, accelerations and stresses in SI units.
+pub(crate) struct Layer {
+    pub units: Units,
+    pub cells: usize,
+    pub columns: Option<usize>,
+    pub low: Boundary,
+    pub high: Boundary,
+    pub acceleration: [f64; DIMENSIONS],
+    pub rheology: MuI,
+}
+
+/// Fewest cells across a layer: a pressure is extrapolated from two.
+const MIN_CELLS: usize = 2;
+/// Most cells across a layer.
+const MAX_CELLS: usize = 1 << 20;
+
+impl Layer {
+    /// Refuses grids that make no sense.
+    pub(crate) fn validate_grid(cells: usize, columns: Option<usize>) -> Result<(), Error> {
+        require(
+            (MIN_CELLS..=MAX_CELLS).contains(&cells),
+            "grid.cells",
+            cells as f64,
+            format!("{MIN_CELLS} to {MAX_CELLS}"),
+        )?;
+        columns.map_or(Ok(()), |columns| {
+            require(
+                (3..=MAX_CELLS).contains(&columns),
+                "grid.columns",
+                columns as f64,
+                format!("3 to {MAX_CELLS}, or none for a flow that does not vary along x"),
+            )
+        })
+    }
+
+    fn boundary_in_units(&self, boundary: Boundary) -> Boundary {
+        match boundary {
+            Boundary::NoSlip { velocity } => Boundary::NoSlip {
+                velocity: velocity / self.units.velocity,
+            },
+            Boundary::LoadedWall { velocity, pressure } => Boundary::LoadedWall {
+                velocity: velocity / self.units.velocity,
+                pressure: pressure / self.units.stress(),
+            },
+            Boundary::FreeSlip | Boundary::FreeSurface => boundary,
+        }
+    }
+
+    /// Computes the steady flow and compares it with the exact velocity and pressure at height z.
+    pub(crate) fn solve(
+        &self,
+        options: &Options,
+        exact_velocity: impl Fn(f64) -> f64,
+        exact_pressure: impl Fn(f64) -> f64,
+        progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<LayerSolution, Error> {
+        let units = self.units;
+        let along = self.columns.map_or(Axis::Flat, |columns| Axis::Periodic {
+            length: columns as f64 / self.cells as f64,
+            cells: columns,
+        });
+        let across = Axis::Bounded {
+            length: 1.0,
+            cells: self.cells,
+            low: self.boundary_in_units(self.low),
+            high: self.boundary_in_units(self.high),
+        };
+        let mut flow = Flow::at_rest(
+            Grid::new([along, across])?,
+            options.threshold_pressure,
+            self.rheology.in_units(&units),
+            self.acceleration.map(|a| a / units.acceleration()),
+            options.method,
+            // A guess from which Newton's method starts: the pressure at rest.
+            |height| exact_pressure(height * units.length) / units.stress(),
+        )?;
+        let mut step = 0;
+        let natural = flow.march(&options.marching, &mut |record| {
+            step += 1;
+            progress(Progress {
+                step,
+                time: record.time * units.time(),
+                dt: record.dt * units.time(),
+                mean_velocity: record.mean_velocity * units.velocity,
+                distance_to_steady: record.acceleration / options.marching.steady_acceleration,
+            })
+        })?;
+        let history: Vec<StepRecord> = natural.iter().map(|r| in_si(r, &units)).collect();
+        let (mut u, mut p) = flow.profile();
+        u.iter_mut().for_each(|u| *u *= units.velocity);
+        p.iter_mut().for_each(|p| *p *= units.stress());
+        let z: Vec<f64> = (0..self.cells)
+            .map(|k| (k as f64 + 0.5) * units.length / self.cells as f64)
+            .collect();
+        let exact_u: Vec<f64> = z.iter().map(|&z| exact_velocity(z)).collect();
+        let exact_p: Vec<f64> = z.iter().map(|&z| exact_pressure(z)).collect();
+        let [yielded_fraction, ill_posed_fraction] = flow.yielded_and_ill_posed();
+        Ok(LayerSolution {
+            velocity_error_l2_relative: l2_error(&u, &exact_u),
+            velocity_error_max_relative: max_error(&u, &exact_u),
+            pressure_error_l2_relative: l2_error(&p, &exact_p),
+            max_speed: flow.max_speed() * units.velocity,
+            boundary_shear_stress: flow.boundary_shear_stress().map(|s| s * units.stress()),
+            yielded_fraction,
+            ill_posed_fraction,
+            spread_along_x: spread_along_x(&flow) * units.velocity,
+            steps: history.len(),
+            linear_solves: history.iter().map(|r| r.linear_solves).sum(),
+            cells: flow.discretisation().grid().cells(),
+            history,
+            units,
+            z,
+            u,
+            p,
+            exact_u,
+            exact_p,
+        })
+    }
+}
+
+fn in_si(record: &StepRecord, units: &Units) -> StepRecord {
+    StepRecord {
+        time: record.time * units.time(),
+        dt: record.dt * units.time(),
+        mean_velocity: record.mean_velocity * units.velocity,
+        acceleration: record.acceleration * units.acceleration(),
+        ..*record
+    }
+}
+
+fn spread_along_x<R: Rheology>(flow: &Flow<R>) -> f64 {
+    let grid = flow.discretisation().grid();
+    let u = &flow.state().u[grid.component(0)];
+    let columns = u.len() / grid.axes()[1].cells();
+    u.chunks_exact(columns).fold(0.0, |spread, row| {
+        let low = row.iter().fold(f64::INFINITY, |m, u| m.min(*u));
+        let high = row.iter().fold(f64::NEG_INFINITY, |m, u| m.max(*u));
+        f64::max(spread, high - low)
+    })
+}
+
+/// √(Σ(a − b)²/Σ b²), or the root mean square of a − b where b is zero.
+fn l2_error(values: &[f64], exact: &[f64]) -> f64 {
+    let miss: f64 = values
+        .iter()
+        .zip(exact)
+        .map(|(a, b)| (a - b) * (a - b))
+        .sum();
+    let size: f64 = exact.iter().map(|b| b * b).sum();
+    let scale = if size > 0.0 { size } else { exact.len() as f64 };
+    (miss / scale).sqrt()
+}
+
+/// max|a − b|/max|b|, or max|a − b| where b is zero.
+fn max_error(values: &[f64], exact: &[f64]) -> f64 {
+    let miss = values
+        .iter()
+        .zip(exact)
+        .fold(0.0_f64, |m, (a, b)| m.max((a - b).abs()));
+    let size = exact.iter().fold(0.0_f64, |m, b| m.max(b.abs()));
+    if size > 0.0 { miss / size } else { miss }
+}

@@ -1,0 +1,34 @@
+//! Finite-volume solver for dense granular flow with a yield stress.
+//!
+//! The material is incompressible: ρ ∂u/∂t = −∇p + ∇·τ + ρ g, ∇·u = 0, with
+//! τ = κ(γ̇, p) 2D/γ̇ where it moves and |τ| ≤ κ(0, p) where it does not. The threshold κ comes from
+//! [`rheology`], for μ(I) κ = c + μ(I) p. Velocities live on the faces and pressures in the cells of
+//! a staggered [`grid`]; a time step solves for velocity, pressure and stress at once
+//! ([`yield_step`]), from rest or in motion, for any Δt.
+//!
+//! # Conventions
+//! - SI units at the surface of the crate; inside, natural units ([`units`]) in which ρ = 1.
+//! - γ̇ = √(2 D:D), so that γ̇ = |du/dz| in simple shear.
+//! - Pressure is positive in compression, other stresses are positive in tension.
+//! - The inertial number I = γ̇ d √(ρ_s/p) is formed with the density of the grains ρ_s; the bulk
+//!   density is ρ = φ ρ_s.
+//! - Nothing depends on the number of threads: the same input gives the same bits.
+//!
+//! # Cases with exact solutions
+//! [`bagnold`] (a layer on an incline), [`plane_shear`] (between plates under a load) and
+//! [`vertical_chute`] (between vertical walls, with a rigid plug).
+
+pub mod bagnold;
+pub mod discretisation;
+mod error;
+pub mod flow;
+pub mod grid;
+pub mod layer;
+pub mod linear_solver;
+pub mod plane_shear;
+pub mod rheology;
+pub mod units;
+pub mod vertical_chute;
+pub mod yield_step;
+
+pub use error::Error;

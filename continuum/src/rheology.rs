@@ -1,0 +1,88 @@
+//! Rheology: the stress that dense granular matter can bear, as a function of strain rate and
+//! pressure.
+//!
+//! A material flows with τ = κ(γ̇, p) · 2D/γ̇ and stays rigid while |τ| ≤ κ(0, p), with
+//! γ̇ = √(2 D:D) and |τ| = √(½ τ:τ). The function κ, the *threshold*, and its two derivatives are
+//! all that a solver needs to know of a law.
+
+mod mu_i;
+mod well_posedness;
+
+pub use mu_i::MuI;
+pub use well_posedness::well_posedness;
+
+/// Shear stress that the material bears at a strain rate and a pressure, with its derivatives.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Threshold {
+    /// κ(γ̇, p) (Pa).
+    pub stress: f64,
+    /// ∂κ/∂γ̇ (Pa s).
+    pub by_rate: f64,
+    /// ∂κ/∂p (dimensionless).
+    pub by_pressure: f64,
+}
+
+/// A law of dense granular flow with a yield stress.
+///
+/// The law must be isotropic, with κ non-negative and non-decreasing in γ̇: then a time step at
+/// given pressure is a convex problem with one solution.
+pub trait Rheology {
+    /// κ(γ̇, p) and its derivatives, for a strain rate γ̇ ≥ 0 (1/s) and a pressure p (Pa); where
+    /// p ≤ 0 only cohesion is left.
+    fn threshold(&self, rate: f64, pressure: f64) -> Threshold;
+
+    /// Ψ(γ̇, p) = ∫₀^γ̇ κ(g, p) dg (W/m³), the dissipation potential of a time step at given
+    /// pressure.
+    fn potential(&self, rate: f64, pressure: f64) -> f64;
+
+    /// Whether the equations of motion are well posed at this strain rate and pressure (short
+    /// waves do not grow at a rate without bound).
+    fn is_well_posed(&self, rate: f64, pressure: f64) -> bool;
+
+    /// The same law with lengths, densities and stresses divided by the given units.
+    fn in_units(&self, units: &crate::units::Units) -> Self
+    where
+        Self: Sized;
+}
+
+/// Strain rate γ̇ = √(2 D:D) (1/s) of the plane velocity gradient
+/// `gradient[i][j]` = ∂u_i/∂x_j, with D = (∇u + ∇uᵀ)/2, so that γ̇ = |du/dz| in simple shear.
+///
+/// Two other conventions are in use among codes, √(D:D) and √(½ D:D); they differ by factors √2
+/// and 2, so this is the only place where the norm is formed from a gradient.
+pub fn strain_rate_norm(gradient: [[f64; 2]; 2]) -> f64 {
+    let [[xx, xz], [zx, zz]] = gradient;
+    let shear = 0.5 * (xz + zx);
+    (2.0 * (xx * xx + zz * zz + 2.0 * shear * shear)).sqrt()
+}
+
+/// Strain rate γ̇ (1/s) from the two plane components γ₁ = ∂u/∂x − ∂w/∂z and γ₂ = ∂u/∂z + ∂w/∂x:
+/// γ̇² = γ₁² + γ₂², equal to [`strain_rate_norm`] where the flow is incompressible.
+#[inline]
+pub fn plane_strain_rate(components: [f64; 2]) -> f64 {
+    (components[0] * components[0] + components[1] * components[1]).sqrt()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn strain_rate_is_the_slope_of_the_velocity_in_simple_shear() {
+        assert!((strain_rate_norm([[0.0, -3.5], [0.0, 0.0]]) - 3.5).abs() < 1e-15);
+        // Pure shear along the diagonals: u = x, w = −z, γ̇ = 2.
+        assert!((strain_rate_norm([[1.0, 0.0], [0.0, -1.0]]) - 2.0).abs() < 1e-15);
+        // A rigid rotation does not strain.
+        assert_eq!(strain_rate_norm([[0.0, 2.0], [-2.0, 0.0]]), 0.0);
+    }
+
+    #[test]
+    fn plane_components_give_the_same_norm_without_divergence() {
+        let gradient = [[0.3, 1.1], [-0.4, -0.3]];
+        let components = [
+            gradient[0][0] - gradient[1][1],
+            gradient[0][1] + gradient[1][0],
+        ];
+        assert!((strain_rate_norm(gradient) - plane_strain_rate(components)).abs() < 1e-15);
+    }
+}

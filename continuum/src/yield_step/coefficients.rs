@@ -1,0 +1,83 @@
+//! The matrix that both solvers fill: [[K, −Dᵀ + G], [−D, 0]] over (u, p), with
+//! K = M/Δt + Bᵀ W C B and G = Bᵀ W g P, where C (2 × 2) and g (2) live at quadrature points and P
+//! interpolates pressure to them.
+
+use crate::discretisation::{COMPONENTS, Discretisation};
+use crate::error::Error;
+use crate::linear_solver::SparseSystem;
+
+/// The matrix of a step with the places of its coefficients.
+pub(super) struct StepMatrix {
+    pub(super) system: SparseSystem,
+    mass: Vec<usize>,
+    divergence: Vec<[usize; 2]>,
+    /// Slots of all points, one after the other: for each velocity of the point (row), its
+    /// velocities and then its pressures (columns).
+    points: Vec<usize>,
+}
+
+impl StepMatrix {
+    pub(super) fn new(discretisation: &Discretisation) -> Result<Self, Error> {
+        let velocities = discretisation.grid().velocities();
+        let size = velocities + discretisation.grid().cells();
+        let mut entries: Vec<(usize, usize)> = (0..velocities).map(|j| (j, j)).collect();
+        for &(cell, j, _) in discretisation.divergence() {
+            entries.push((j, velocities + cell));
+            entries.push((velocities + cell, j));
+        }
+        for point in discretisation.points() {
+            for &row in point.velocities() {
+                entries.extend(point.velocities().iter().map(|&column| (row, column)));
+                let cells = point.pressures().0;
+                entries.extend(cells.iter().map(|&cell| (row, velocities + cell)));
+            }
+        }
+        let (system, slots) = SparseSystem::new(size, &entries)?;
+        let (mass, rest) = slots.split_at(velocities);
+        let (divergence, points) = rest.split_at(2 * discretisation.divergence().len());
+        Ok(Self {
+            system,
+            mass: mass.to_vec(),
+            divergence: divergence.chunks_exact(2).map(|c| [c[0], c[1]]).collect(),
+            points: points.to_vec(),
+        })
+    }
+
+    /// Fills the matrix; `law` gives C and g at each point.
+    pub(super) fn fill(
+        &mut self,
+        discretisation: &Discretisation,
+        dt: f64,
+        law: impl Fn(usize) -> ([[f64; COMPONENTS]; COMPONENTS], [f64; COMPONENTS]),
+    ) {
+        let values = self.system.values_mut();
+        values.fill(0.0);
+        for (&slot, m) in self.mass.iter().zip(discretisation.mass()) {
+            values[slot] += m / dt;
+        }
+        for (slots, &(_, _, area)) in self.divergence.iter().zip(discretisation.divergence()) {
+            values[slots[0]] -= area;
+            values[slots[1]] -= area;
+        }
+        let mut slots = self.points.iter();
+        for (q, point) in discretisation.points().iter().enumerate() {
+            let (c, g) = law(q);
+            let (b1, b2) = (point.rates(0), point.rates(1));
+            let pressure_weights = point.pressures().1;
+            for row in 0..b1.len() {
+                // Row of Bᵀ W C, then of Bᵀ W g.
+                let left = [
+                    point.weight * (b1[row] * c[0][0] + b2[row] * c[1][0]),
+                    point.weight * (b1[row] * c[0][1] + b2[row] * c[1][1]),
+                ];
+                for (column, &slot) in (0..b1.len()).zip(slots.by_ref()) {
+                    values[slot] += left[0] * b1[column] + left[1] * b2[column];
+                }
+                let by_pressure = point.weight * (b1[row] * g[0] + b2[row] * g[1]);
+                for (weight, &slot) in pressure_weights.iter().zip(slots.by_ref()) {
+                    values[slot] += by_pressure * weight;
+                }
+            }
+        }
+    }
+}

@@ -1,0 +1,418 @@
+//! Primal–dual Newton method on velocity, pressure and stress together.
+//!
+//! After Chan, Golub & Mulet (*SIAM J. Sci. Comput.* 20 (1999) 1964): the stress law is written as
+//! s √(|γ|² + ε²) = κ γ and linearised with s as an unknown of its own, which keeps Newton's method
+//! fast down to very small ε where the law solved for s alone makes it stall. The pressure in the
+//! threshold is an unknown of the same Newton step: taking it from the previous step or iterating
+//! on it outside costs accuracy or time. ε starts at 0.3 √(g/H) and falls tenfold per iteration.
+
+use serde::{Deserialize, Serialize};
+
+use super::coefficients::StepMatrix;
+use super::{
+    FlowState, Residuals, StepProblem, StepReport, YieldSolver, divergence_residual,
+    largest_or_nan, momentum_residual, threshold_pressure,
+};
+use crate::discretisation::{COMPONENTS, Discretisation, QuadraturePoint};
+use crate::error::Error;
+use crate::rheology::{Rheology, plane_strain_rate};
+
+/// Settings of [`PrimalDual`]; times and lengths in natural units.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct PrimalDualOptions {
+    /// Strain-rate floor ε of the result, in √(g/H): rigid matter creeps at this rate. Below 1e-7
+    /// the round-off of γ in a moving plug dominates.
+    pub strain_rate_floor: f64,
+    /// ε of the first iteration from a cold start.
+    pub first_strain_rate_floor: f64,
+    /// Factor by which ε falls after each iteration.
+    pub floor_factor: f64,
+    /// Iterations after which an attempt is given up.
+    pub max_iterations: usize,
+    /// Tolerance of the momentum balance, as a fraction of g.
+    pub momentum_tolerance: f64,
+    /// Tolerance of the divergence, in √(g/H).
+    pub divergence_tolerance: f64,
+    /// Tolerance of the stress law, relative; raised to the round-off of γ/ε where that is larger.
+    pub stress_tolerance: f64,
+}
+
+impl Default for PrimalDualOptions {
+    fn default() -> Self {
+        Self {
+            strain_rate_floor: 1e-6,
+            first_strain_rate_floor: 0.3,
+            floor_factor: 0.1,
+            max_iterations: 40,
+            momentum_tolerance: 1e-9,
+            divergence_tolerance: 1e-9,
+            stress_tolerance: 1e-6,
+        }
+    }
+}
+
+/// Smallest ε with which the stress law can be met in double precision.
+const SMALLEST_STRAIN_RATE_FLOOR: f64 = 1e-7;
+/// Iterations after which a start from the previous stress at the final ε is given up in favour of
+/// a cold start.
+const WARM_ITERATIONS: usize = 12;
+
+/// The law linearised at one quadrature point.
+#[derive(Debug, Clone, Copy, Default)]
+struct LinearisedPoint {
+    /// κ γ/√(|γ|² + ε²): the stress that the law asks for now.
+    stress: [f64; COMPONENTS],
+    /// ∂s/∂γ as the stress update uses it.
+    by_rate: [[f64; COMPONENTS]; COMPONENTS],
+    /// ∂s/∂p.
+    by_pressure: [f64; COMPONENTS],
+}
+
+/// How an attempt begins and descends.
+struct Strategy {
+    first_floor: f64,
+    factor: f64,
+    max_iterations: usize,
+    line_search: bool,
+}
+
+/// The default solver of time steps. It holds the matrix and the work arrays of one grid.
+pub struct PrimalDual {
+    options: PrimalDualOptions,
+    matrix: StepMatrix,
+    trial: FlowState,
+    points: Vec<LinearisedPoint>,
+    right_hand_side: Vec<f64>,
+    change: Vec<f64>,
+    candidate: Vec<f64>,
+    candidate_pressure: Vec<f64>,
+}
+
+impl PrimalDual {
+    /// Analyses the grid's matrix and sets the work arrays up.
+    ///
+    /// # Errors
+    /// Options out of range, or a pattern that cannot be analysed.
+    pub fn new(discretisation: &Discretisation, options: PrimalDualOptions) -> Result<Self, Error> {
+        crate::error::require(
+            options.strain_rate_floor >= SMALLEST_STRAIN_RATE_FLOOR
+                && options.strain_rate_floor <= options.first_strain_rate_floor,
+            "solver.strain_rate_floor",
+            options.strain_rate_floor,
+            format!(
+                "{SMALLEST_STRAIN_RATE_FLOOR:e} to solver.first_strain_rate_floor = {}",
+                options.first_strain_rate_floor
+            ),
+        )?;
+        crate::error::require(
+            options.floor_factor > 0.0 && options.floor_factor < 1.0,
+            "solver.floor_factor",
+            options.floor_factor,
+            "between 0 and 1, both excluded",
+        )?;
+        let velocities = discretisation.grid().velocities();
+        let cells = discretisation.grid().cells();
+        Ok(Self {
+            options,
+            matrix: StepMatrix::new(discretisation)?,
+            trial: FlowState::at_rest(discretisation, vec![0.0; cells]),
+            points: vec![LinearisedPoint::default(); discretisation.points().len()],
+            right_hand_side: vec![0.0; velocities + cells],
+            change: vec![0.0; velocities + cells],
+            candidate: vec![0.0; velocities],
+            candidate_pressure: vec![0.0; cells],
+        })
+    }
+
+    /// One run of Newton's method on `self.trial`, which starts as a copy of `start`.
+    fn attempt<R: Rheology>(
+        &mut self,
+        problem: &StepProblem<'_, R>,
+        start: &FlowState,
+        strategy: &Strategy,
+        report: &mut StepReport,
+    ) {
+        self.trial.clone_from(start);
+        let mut floor = strategy.first_floor;
+        for _ in 0..strategy.max_iterations {
+            self.linearise(problem, floor);
+            self.assemble(problem, &start.u);
+            report.iterations += 1;
+            report.linear_solves += 1;
+            let solved = self.matrix.system.factorise().and_then(|()| {
+                self.matrix
+                    .system
+                    .solve(&self.right_hand_side, &mut self.change)
+            });
+            if solved.is_err() {
+                return;
+            }
+            let fraction = if strategy.line_search {
+                self.line_search(problem, &start.u, floor)
+            } else {
+                1.0
+            };
+            self.update(problem, floor, fraction);
+            report.residuals = self.residuals(problem, &start.u, floor);
+            if floor <= self.options.strain_rate_floor
+                && self.is_converged(problem, &report.residuals)
+            {
+                report.converged = true;
+                return;
+            }
+            if fraction >= 0.5 {
+                floor = (floor * strategy.factor).max(self.options.strain_rate_floor);
+            }
+        }
+    }
+
+    /// ∂s/∂γ = κ/γ_ε 1 + (κ_γ γ − s) ⊗ γ/γ_ε² and ∂s/∂p = κ_p γ/γ_ε, with γ_ε = √(|γ|² + ε²).
+    fn linearise<R: Rheology>(&mut self, problem: &StepProblem<'_, R>, floor: f64) {
+        let points = problem.discretisation.points();
+        for ((point, linear), s) in points.iter().zip(&mut self.points).zip(&self.trial.s) {
+            let (gamma, rate, threshold) =
+                evaluate(problem.rheology, point, &self.trial.u, &self.trial.p, floor);
+            let viscosity = threshold.stress / rate;
+            let inverse_square = 1.0 / (rate * rate);
+            for a in 0..COMPONENTS {
+                linear.stress[a] = viscosity * gamma[a];
+                linear.by_pressure[a] = threshold.by_pressure * gamma[a] / rate;
+                for b in 0..COMPONENTS {
+                    linear.by_rate[a][b] =
+                        (threshold.by_rate * gamma[a] - s[a]) * gamma[b] * inverse_square;
+                }
+                linear.by_rate[a][a] += viscosity;
+            }
+        }
+    }
+
+    /// Fills the matrix, with ∂s/∂γ symmetrised (positive definite while |s| ≤ κ), and the
+    /// right-hand side.
+    fn assemble<R: Rheology>(&mut self, problem: &StepProblem<'_, R>, u_old: &[f64]) {
+        let discretisation = problem.discretisation;
+        let linear = &self.points;
+        self.matrix.fill(discretisation, problem.dt, |q| {
+            let mut c = linear[q].by_rate;
+            let mean = 0.5 * (c[0][1] + c[1][0]);
+            c[0][1] = mean;
+            c[1][0] = mean;
+            (c, linear[q].by_pressure)
+        });
+        let velocities = discretisation.grid().velocities();
+        let (momentum, continuity) = self.right_hand_side.split_at_mut(velocities);
+        let mass = discretisation.mass();
+        for (j, r) in momentum.iter_mut().enumerate() {
+            *r = problem.load[j] - mass[j] * (self.trial.u[j] - u_old[j]) / problem.dt;
+        }
+        for (point, linear) in discretisation.points().iter().zip(&self.points) {
+            for (slot, &j) in point.velocities().iter().enumerate() {
+                momentum[j] -= point.weight
+                    * (point.rates(0)[slot] * linear.stress[0]
+                        + point.rates(1)[slot] * linear.stress[1]);
+            }
+        }
+        for &(cell, j, area) in discretisation.divergence() {
+            momentum[j] += area * self.trial.p[cell];
+        }
+        divergence_residual(discretisation, &self.trial.u, continuity);
+    }
+
+    /// Largest fraction 1, ½, ¼, ⅛ of the change of velocity with which the convex functional of
+    /// the step at the new pressure does not grow.
+    fn line_search<R: Rheology>(
+        &mut self,
+        problem: &StepProblem<'_, R>,
+        u_old: &[f64],
+        floor: f64,
+    ) -> f64 {
+        let (du, dp) = self.change.split_at(self.trial.u.len());
+        let pressure = &mut self.candidate_pressure;
+        for ((c, p), d) in pressure.iter_mut().zip(&self.trial.p).zip(dp) {
+            *c = p + d;
+        }
+        let start = functional(problem, u_old, &self.trial.u, pressure, floor);
+        let mut fraction = 1.0;
+        while fraction > 0.125 {
+            for ((c, u), d) in self.candidate.iter_mut().zip(&self.trial.u).zip(du) {
+                *c = u + fraction * d;
+            }
+            let value = functional(problem, u_old, &self.candidate, pressure, floor);
+            if value <= start + 1e-12 * start.abs() {
+                break;
+            }
+            fraction *= 0.5;
+        }
+        fraction
+    }
+
+    /// Adds the change, and brings stresses that ended above the threshold back onto it.
+    fn update<R: Rheology>(&mut self, problem: &StepProblem<'_, R>, floor: f64, fraction: f64) {
+        let (du, dp) = self.change.split_at(self.trial.u.len());
+        let points = problem.discretisation.points();
+        for ((point, linear), s) in points.iter().zip(&self.points).zip(&mut self.trial.s) {
+            let rate = point.strain_rate_change(du);
+            let pressure = point.pressure(dp);
+            for (a, s) in s.iter_mut().enumerate() {
+                let target = linear.stress[a]
+                    + linear.by_rate[a][0] * rate[0]
+                    + linear.by_rate[a][1] * rate[1]
+                    + linear.by_pressure[a] * pressure;
+                *s += fraction * (target - *s);
+            }
+        }
+        for (u, d) in self.trial.u.iter_mut().zip(du) {
+            *u += fraction * d;
+        }
+        for (p, d) in self.trial.p.iter_mut().zip(dp) {
+            *p += d;
+        }
+        for (point, s) in points.iter().zip(&mut self.trial.s) {
+            let (_, _, threshold) =
+                evaluate(problem.rheology, point, &self.trial.u, &self.trial.p, floor);
+            let size = plane_strain_rate(*s);
+            if size > threshold.stress {
+                let shrink = threshold.stress / size;
+                s[0] *= shrink;
+                s[1] *= shrink;
+            }
+        }
+    }
+
+    /// All residuals of the trial state; overwrites the right-hand side.
+    fn residuals<R: Rheology>(
+        &mut self,
+        problem: &StepProblem<'_, R>,
+        u_old: &[f64],
+        floor: f64,
+    ) -> Residuals {
+        let (momentum, continuity) = self.right_hand_side.split_at_mut(self.trial.u.len());
+        let mut stress = 0.0;
+        for (point, s) in problem.discretisation.points().iter().zip(&self.trial.s) {
+            let (gamma, rate, threshold) =
+                evaluate(problem.rheology, point, &self.trial.u, &self.trial.p, floor);
+            let miss = [
+                s[0] * rate - threshold.stress * gamma[0],
+                s[1] * rate - threshold.stress * gamma[1],
+            ];
+            let scale = rate * (threshold.stress + 1e-3);
+            stress = largest_or_nan(stress, plane_strain_rate(miss) / scale);
+        }
+        Residuals {
+            momentum: momentum_residual(problem, u_old, &self.trial, momentum),
+            divergence: divergence_residual(problem.discretisation, &self.trial.u, continuity),
+            stress,
+            strain_rate_floor: floor,
+        }
+    }
+
+    fn is_converged<R>(&self, problem: &StepProblem<'_, R>, residuals: &Residuals) -> bool {
+        let axes = problem.discretisation.grid().axes();
+        let spacing = axes
+            .iter()
+            .filter(|axis| **axis != crate::grid::Axis::Flat)
+            .fold(f64::INFINITY, |h, axis| h.min(axis.spacing()));
+        let speed = self.trial.u.iter().fold(0.0_f64, |m, u| m.max(u.abs()));
+        // Digits of γ that a large common velocity costs.
+        let round_off = 10.0 * f64::EPSILON * speed / spacing;
+        let options = &self.options;
+        residuals.momentum <= options.momentum_tolerance
+            && residuals.divergence <= options.divergence_tolerance.max(round_off)
+            && residuals.stress
+                <= options
+                    .stress_tolerance
+                    .max(round_off / options.strain_rate_floor)
+    }
+}
+
+/// γ, γ_ε = √(|γ|² + ε²) and the threshold at a point.
+#[inline]
+fn evaluate<R: Rheology>(
+    rheology: &R,
+    point: &QuadraturePoint,
+    u: &[f64],
+    p: &[f64],
+    floor: f64,
+) -> ([f64; COMPONENTS], f64, crate::rheology::Threshold) {
+    let gamma = point.strain_rate(u);
+    let rate = (gamma[0] * gamma[0] + gamma[1] * gamma[1] + floor * floor).sqrt();
+    let (pressure, depends) = threshold_pressure(point.pressure(p));
+    let mut threshold = rheology.threshold(rate, pressure);
+    if !depends {
+        threshold.by_pressure = 0.0;
+    }
+    (gamma, rate, threshold)
+}
+
+/// J(u) = ½ (u − u*)ᵀ M (u − u*)/Δt + Σ W Ψ(γ_ε, p) − F·u: convex in u, least at the solution of
+/// the step among velocities without divergence.
+fn functional<R: Rheology>(
+    problem: &StepProblem<'_, R>,
+    u_old: &[f64],
+    u: &[f64],
+    p: &[f64],
+    floor: f64,
+) -> f64 {
+    let mass = problem.discretisation.mass();
+    let kinetic: f64 = (0..u.len())
+        .map(|j| {
+            let change = u[j] - u_old[j];
+            0.5 * mass[j] * change * change / problem.dt - problem.load[j] * u[j]
+        })
+        .sum();
+    let dissipated: f64 = problem
+        .discretisation
+        .points()
+        .iter()
+        .map(|point| {
+            let gamma = point.strain_rate(u);
+            let rate = (gamma[0] * gamma[0] + gamma[1] * gamma[1] + floor * floor).sqrt();
+            let (pressure, _) = threshold_pressure(point.pressure(p));
+            point.weight * problem.rheology.potential(rate, pressure)
+        })
+        .sum();
+    kinetic + dissipated
+}
+
+impl<R: Rheology> YieldSolver<R> for PrimalDual {
+    /// Three attempts: from the previous stress at the final ε, from a large ε, and from a larger
+    /// one with slow descent and line search.
+    fn step(
+        &mut self,
+        problem: &StepProblem<'_, R>,
+        state: &mut FlowState,
+    ) -> Result<StepReport, Error> {
+        let options = self.options;
+        let strategies = [
+            Strategy {
+                first_floor: options.strain_rate_floor,
+                factor: options.floor_factor,
+                max_iterations: WARM_ITERATIONS,
+                line_search: false,
+            },
+            Strategy {
+                first_floor: options.first_strain_rate_floor,
+                factor: options.floor_factor,
+                max_iterations: options.max_iterations,
+                line_search: false,
+            },
+            Strategy {
+                first_floor: (1.0_f64).max(options.first_strain_rate_floor),
+                factor: options.floor_factor.sqrt(),
+                max_iterations: 2 * options.max_iterations,
+                line_search: true,
+            },
+        ];
+        // Without stress there is nothing warm to start from.
+        let is_cold = state.s.iter().all(|s| *s == [0.0; COMPONENTS]);
+        let mut report = StepReport::default();
+        for strategy in &strategies[usize::from(is_cold)..] {
+            self.attempt(problem, state, strategy, &mut report);
+            if report.converged {
+                state.clone_from(&self.trial);
+                break;
+            }
+        }
+        Ok(report)
+    }
+}
