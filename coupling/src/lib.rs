@@ -2,5 +2,7 @@
 //! of the μ(I) rheology with its uncertainties.
 
 pub mod calibration;
+pub mod campaign;
 pub mod coarse_graining;
+pub mod incline;
 pub mod steady_state;

@@ -1,0 +1,205 @@
+//! Which runs a campaign makes.
+
+use crate::calibration::mu_of_i;
+use crate::incline::{InclineError, InclineResult, InclineSpec, Purpose, Start};
+use serde::{Deserialize, Serialize};
+
+/// Range of slopes to search and how finely.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Bracket {
+    /// A slope thought to be at rest [degrees].
+    pub low: f64,
+    /// A slope thought to flow [degrees].
+    pub high: f64,
+    /// Width at which the search ends [degrees].
+    pub resolution: f64,
+}
+
+/// The law from which starting velocities are guessed: the nearer to the truth, the sooner flows are steady.
+/// Friction against σ_zz, which in a steady flow is tan θ.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct GuessedLaw {
+    /// μ_s.
+    pub mu_s: f64,
+    /// μ_2.
+    pub mu_2: f64,
+    /// I_0.
+    pub i_0: f64,
+}
+
+impl GuessedLaw {
+    /// I = I_0 (tan θ − μ_s)/(μ_2 − tan θ), kept within 0.05 and 1.
+    pub fn inertial_number(&self, slope: f64) -> f64 {
+        let t = slope.tan();
+        // Near μ_2 and beyond, the law has no steady flow.
+        if t >= self.mu_2 || mu_of_i(self.mu_s, self.mu_2, self.i_0, 1.0) <= t {
+            return 1.0;
+        }
+        (self.i_0 * (t - self.mu_s) / (self.mu_2 - t)).clamp(0.05, 1.0)
+    }
+}
+
+/// A campaign.
+#[derive(Clone, Debug)]
+pub struct CampaignSpec {
+    /// Bed, law and times of a measuring run; its slope, start and purpose are set by the campaign.
+    pub base: InclineSpec,
+    /// Material in the thesis' Table 2.6 to compare with: `moderate` or `gravel`.
+    pub published_material: Option<String>,
+    /// Slopes of the measured flows [degrees].
+    pub flow_angles_degrees: Vec<f64>,
+    /// Starting velocities of measured flows.
+    pub guessed_law: GuessedLaw,
+    /// Search for the slope where flow stops.
+    pub stop: Bracket,
+    /// Search for the slope where a bed at rest starts.
+    pub onset: Bracket,
+    /// Longest run of a search [s].
+    pub search_time: f64,
+    /// Inertial number at the start of the stop search; low, so that beds that stop do so soon.
+    pub search_inertial_number: f64,
+    /// Largest drift of the mean velocity over the averaging time, relative, of flows whose points are used:
+    /// pairs (I, μ) are local and hold in a slow drift, though tan θ does not.
+    pub usable_drift: f64,
+}
+
+/// What can be wrong with a campaign.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum CampaignError {
+    /// A number is out of range.
+    #[error("campaign.{key} = {value}: must be {allowed}")]
+    OutOfRange {
+        /// Name of the key.
+        key: &'static str,
+        /// The value found.
+        value: f64,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// A run failed.
+    #[error(transparent)]
+    Run(#[from] InclineError),
+    /// The stop flag was set.
+    #[error("the campaign was stopped; finished runs are kept")]
+    Stopped,
+}
+
+impl CampaignSpec {
+    /// The short campaign of the moderate material: below 2·10⁹ grain-steps for the default bed of 1800 grains
+    /// with steps of 5·10⁻⁴ √(d/g). `base` gives the bed, the law, d, g and the time step; its times are set
+    /// here.
+    pub fn short(mut base: InclineSpec) -> Self {
+        let unit = (base.diameter / base.gravity).sqrt();
+        base.relax_time = 25.0 * unit;
+        base.average_time = 30.0 * unit;
+        base.max_time = 65.0 * unit;
+        Self {
+            base,
+            published_material: Some("moderate".into()),
+            flow_angles_degrees: vec![30.0, 31.5, 33.0, 35.0, 37.0],
+            guessed_law: GuessedLaw { mu_s: 0.45, mu_2: 0.95, i_0: 0.6 },
+            stop: Bracket { low: 24.0, high: 30.0, resolution: 1.5 },
+            onset: Bracket { low: 28.0, high: 36.0, resolution: 2.0 },
+            search_time: 35.0 * unit,
+            search_inertial_number: 0.06,
+            usable_drift: 0.25,
+        }
+    }
+
+    /// Checks the campaign's numbers; those of its runs are checked when they start, the base here.
+    ///
+    /// # Errors
+    /// The first number out of range, by name.
+    pub fn validate(&self) -> Result<(), CampaignError> {
+        let check = |key, value: f64, ok: bool, allowed| {
+            if ok && value.is_finite() {
+                Ok(())
+            } else {
+                Err(CampaignError::OutOfRange { key, value, allowed })
+            }
+        };
+        for angle in &self.flow_angles_degrees {
+            let ok = *angle > 0.0 && *angle < 90.0;
+            check("flow_angles_degrees", *angle, ok, "above 0 and below 90")?;
+        }
+        let count = self.flow_angles_degrees.len() as f64;
+        check("flow_angles_degrees (number)", count, count >= 1.0, "at least 1")?;
+        for (key_low, key_width, bracket) in [
+            ("stop.low", "stop.high - stop.low", &self.stop),
+            ("onset.low", "onset.high - onset.low", &self.onset),
+        ] {
+            let width = bracket.high - bracket.low;
+            let ok = bracket.low > 0.0 && bracket.low < 90.0;
+            check(key_low, bracket.low, ok, "above 0 and below 90")?;
+            check(key_width, width, width > 0.0 && bracket.high < 90.0, "positive, with high below 90")?;
+        }
+        let finest = |b: &Bracket| b.resolution >= 0.01;
+        check("stop.resolution", self.stop.resolution, finest(&self.stop), "at least 0.01 degrees")?;
+        let onset = &self.onset;
+        check("onset.resolution", onset.resolution, finest(onset), "at least 0.01 degrees")?;
+        check("search_time", self.search_time, self.search_time > 0.0, "positive")?;
+        let i = self.search_inertial_number;
+        check("search_inertial_number", i, i > 0.0, "positive")?;
+        check("usable_drift", self.usable_drift, self.usable_drift > 0.0, "positive")?;
+        let g = &self.guessed_law;
+        let ok = g.mu_s > 0.0 && g.mu_2 > g.mu_s;
+        check("guessed_law.mu_2", g.mu_2, ok, "above guessed_law.mu_s, both positive")?;
+        check("guessed_law.i_0", g.i_0, g.i_0 > 0.0, "positive")?;
+        self.flow_run(self.sorted_flow_angles()[0]).validate()?;
+        Ok(())
+    }
+
+    /// Slopes of the measured flows, rising, each once.
+    pub fn sorted_flow_angles(&self) -> Vec<f64> {
+        let mut angles = self.flow_angles_degrees.clone();
+        angles.sort_by(f64::total_cmp);
+        angles.dedup();
+        angles
+    }
+
+    pub(super) fn flow_run(&self, angle: f64) -> InclineSpec {
+        let slope = angle.to_radians();
+        let inertial_number = self.guessed_law.inertial_number(slope);
+        InclineSpec {
+            slope,
+            start: Start::Flow { inertial_number },
+            purpose: Purpose::Measure,
+            ..self.base.clone()
+        }
+    }
+
+    pub(super) fn stop_run(&self, angle: f64) -> InclineSpec {
+        InclineSpec {
+            slope: angle.to_radians(),
+            start: Start::Flow { inertial_number: self.search_inertial_number },
+            purpose: Purpose::StopSearch,
+            relax_time: 0.5 * self.search_time,
+            max_time: self.search_time,
+            ..self.base.clone()
+        }
+    }
+
+    pub(super) fn onset_run(&self, angle: f64) -> InclineSpec {
+        InclineSpec {
+            slope: angle.to_radians(),
+            start: Start::Rest,
+            purpose: Purpose::OnsetSearch,
+            max_time: self.search_time,
+            ..self.base.clone()
+        }
+    }
+
+    /// May the points of this run enter the fit? It must have flowed without drifting far.
+    pub fn is_usable(&self, run: &InclineResult) -> bool {
+        run.profile.is_some() && run.flows() && run.steady.drift.abs() <= self.usable_drift
+    }
+
+    /// Most grain-steps the campaign can take if no search has to move outward.
+    pub fn largest_cost(&self) -> u64 {
+        let steps = |time: f64| time / self.base.timestep;
+        let runs = |b: &Bracket| 2.0 + ((b.high - b.low) / b.resolution).log2().ceil().max(0.0);
+        let flows = self.flow_angles_degrees.len() as f64 * steps(self.base.max_time);
+        let searches = (runs(&self.stop) + runs(&self.onset)) * steps(self.search_time);
+        ((flows + searches) * self.base.bed.len() as f64) as u64
+    }
+}

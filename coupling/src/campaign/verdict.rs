@@ -1,0 +1,179 @@
+//! Good enough or not, in words with figures.
+
+use super::CampaignSpec;
+use crate::calibration::thesis::{Estimator, EstimatorFit, Row, published_row};
+use crate::calibration::{FitError, MuIFit};
+use crate::incline::{InclineResult, Outcome};
+use serde::{Deserialize, Serialize};
+
+/// The judgement on a calibration.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Verdict {
+    /// Fit to feed a continuum solver, inside its validity window.
+    pub good: bool,
+    /// Why, sentence by sentence.
+    pub text: String,
+}
+
+pub(super) struct Evidence<'a> {
+    pub spec: &'a CampaignSpec,
+    pub flows: &'a [InclineResult],
+    pub used: usize,
+    pub fit: &'a Result<MuIFit, FitError>,
+    pub fit_zz: &'a Result<MuIFit, FitError>,
+    pub estimators: &'a [EstimatorFit],
+    pub stop: Option<(f64, f64)>,
+    pub onset: Option<(f64, f64)>,
+}
+
+/// Root-mean-square residual, relative to μ, above which μ(I) does not describe the material.
+const LARGEST_MISFIT: f64 = 0.03;
+/// Largest |σ_zz/weight − 1| of a trustworthy flow.
+const LARGEST_WEIGHT_ERROR: f64 = 0.01;
+/// Overlap over radius above which grains are too soft for the limit of hard grains.
+const LARGEST_OVERLAP: f64 = 0.05;
+
+pub(super) fn judge(e: &Evidence) -> Verdict {
+    let mut good = true;
+    let mut text = Vec::new();
+    match e.fit {
+        Err(error) => {
+            good = false;
+            text.push(format!("No rheology: {error}."));
+        }
+        Ok(fit) => {
+            text.push(format!(
+                "mu_s = {:.3} ± {:.3}, mu_2 = {:.3} ± {:.3}, I_0 = {:.3} ± {:.3} for mu = |tau|/p with \
+                 p = trace/3, from {} points of {} flows, valid for I = {:.3} to {:.3}.",
+                fit.mu_s, fit.mu_s_error, fit.mu_2, fit.mu_2_error, fit.i_0, fit.i_0_error,
+                fit.degrees_of_freedom + 3, fit.runs, fit.valid_i[0], fit.valid_i[1],
+            ));
+            let (middle, error) = fit.band((fit.valid_i[0] * fit.valid_i[1]).sqrt());
+            let misfit = fit.rms_residual / middle;
+            if misfit > LARGEST_MISFIT {
+                good = false;
+                text.push(format!(
+                    "Points scatter by {:.1} % of mu about the curve (more than {:.0} %): one mu(I) does not \
+                     describe this material.",
+                    100.0 * misfit, 100.0 * LARGEST_MISFIT
+                ));
+            } else {
+                text.push(format!(
+                    "mu(I) describes the points to {:.1} % of mu; in the middle of the range mu is known to \
+                     {:.1} %.",
+                    100.0 * misfit, 100.0 * error / middle
+                ));
+            }
+            text.push(fit.identifiability.clone());
+            good &= fit.identified;
+            text.push(format!(
+                "Errors are {:.1} times those of counting, because layers of one run are not independent.",
+                fit.error_scale
+            ));
+        }
+    }
+    if let Ok(fit) = e.fit_zz {
+        text.push(format!(
+            "Against sigma_zz instead of p: mu_s = {:.3} ± {:.3}, mu_2 = {:.3} ± {:.3}, I_0 = {:.3} ± {:.3}; \
+             the two differ by the normal stress differences.",
+            fit.mu_s, fit.mu_s_error, fit.mu_2, fit.mu_2_error, fit.i_0, fit.i_0_error
+        ));
+    }
+    judge_runs(e, &mut good, &mut text);
+    for (what, bracket) in [("Flow stops", e.stop), ("A bed at rest starts to flow", e.onset)] {
+        text.push(match bracket {
+            Some((low, high)) => format!("{what} between {low:.2}° and {high:.2}°."),
+            None => format!("{what} at a slope outside those tried."),
+        });
+    }
+    if let Some(material) = &e.spec.published_material {
+        compare(e, material, &mut text);
+    }
+    Verdict { good, text: text.join(" ") }
+}
+
+fn judge_runs(e: &Evidence, good: &mut bool, text: &mut Vec<String>) {
+    let measured = e.flows.len();
+    if e.used < measured {
+        text.push(format!(
+            "{} of {measured} flows left out (at rest, or drifting by more than {:.0} % while averaged).",
+            measured - e.used,
+            100.0 * e.spec.usable_drift
+        ));
+    }
+    let drifting: Vec<String> = e
+        .flows
+        .iter()
+        .filter(|r| e.spec.is_usable(r) && r.outcome != Outcome::Steady)
+        .map(|r| {
+            format!(
+                "{:.1}° ({:+.0} ± {:.0} %)",
+                r.slope_degrees, 100.0 * r.steady.drift, 100.0 * r.steady.drift_error
+            )
+        })
+        .collect();
+    if !drifting.is_empty() {
+        text.push(format!(
+            "Not shown to be steady, used as local pairs (I, mu) but not to be read as tan theta: {}.",
+            drifting.join(", ")
+        ));
+    }
+    let used = || e.flows.iter().filter(|r| e.spec.is_usable(r));
+    let weight = used().filter_map(|r| r.checks).map(|c| c.weight_relative).fold(0.0, f64::max);
+    if weight > LARGEST_WEIGHT_ERROR {
+        *good = false;
+        text.push(format!(
+            "sigma_zz misses the weight above by up to {:.1} % (more than {:.0} %): averages are too short.",
+            100.0 * weight, 100.0 * LARGEST_WEIGHT_ERROR
+        ));
+    } else if e.used > 0 {
+        text.push(format!("sigma_zz carries the weight above to {:.2} %.", 100.0 * weight));
+    }
+    let overlap = used().map(|r| r.largest_overlap).fold(0.0, f64::max);
+    if overlap > LARGEST_OVERLAP {
+        text.push(format!(
+            "Grains overlap by up to {:.1} % of their radius: softer than hard grains.",
+            100.0 * overlap
+        ));
+    }
+}
+
+fn compare(e: &Evidence, material: &str, text: &mut Vec<String>) {
+    let Some(published) = published_row(material, Estimator::Top, true) else {
+        text.push(format!("The thesis has no row for `{material}`."));
+        return;
+    };
+    let mut differ = Vec::new();
+    let mut list = |ours: &Row, name: &str| {
+        let d = ours.differences(published);
+        text.push(format!(
+            "Against the thesis' \"top, with Phi\" row ({:.3} ± {:.3}, {:.3} ± {:.3}, {:.3} ± {:.3}), {name} \
+             differs by {:+.1}, {:+.1} and {:+.1} joint errors in mu_s, mu_2 and I_0.",
+            published.mu_s[0], published.mu_s[1], published.mu_2[0], published.mu_2[1],
+            published.i_0[0], published.i_0[1], d[0], d[1], d[2]
+        ));
+        differ.push(d.iter().any(|x| !(x.abs() <= 1.0)));
+    };
+    if let Ok(fit) = e.fit {
+        let row = Row {
+            mu_s: [fit.mu_s, fit.mu_s_error],
+            mu_2: [fit.mu_2, fit.mu_2_error],
+            i_0: [fit.i_0, fit.i_0_error],
+        };
+        list(&row, "our fit of measured stress");
+    }
+    let same = e.estimators.iter().find(|f| f.estimator == Estimator::Top && f.with_phi);
+    if let Some(row) = same.and_then(|f| f.row) {
+        list(&row, "the same estimator on our flows");
+    }
+    if differ.contains(&true) {
+        text.push(
+            "Where this is more than one joint error, these are possible reasons: the thesis prints neither \
+             its height, box, stiffness nor time step, and ours are our own; it takes mu = tan theta where we \
+             measure |tau|/p with p = trace/3, higher by the normal stress differences (5 to 10 %); its flows \
+             start from a falling cloud; its I is one number per flow, ours one per layer, without the top 2 d \
+             and the base 3 d; our flows are a few hundred diameters of shear long and may still drift."
+                .into(),
+        );
+    }
+}

@@ -1,0 +1,125 @@
+//! What an inclined-plane run leaves.
+
+use super::{Purpose, Start};
+use crate::calibration::LocalPoint;
+use crate::coarse_graining::{BalanceCheck, Profile};
+use crate::steady_state::SteadyTest;
+use colluvium_dem::Snapshot;
+use serde::{Deserialize, Serialize};
+
+/// How a run ended.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Outcome {
+    /// The grains came, or stayed, at rest.
+    Rest,
+    /// They flow, and the mean velocity is stationary.
+    Steady,
+    /// They flow ever faster.
+    Accelerating,
+    /// They flow ever slower.
+    Decelerating,
+    /// They move, and the series is too short or noisy to say more.
+    Undecided,
+}
+
+/// The flow at one instant, free grains only.
+#[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
+pub struct SeriesPoint {
+    /// Time [s].
+    pub time: f64,
+    /// Kinetic energy, translation and rotation [J].
+    pub kinetic_energy: f64,
+    /// Mean velocity downslope, by mass [m/s].
+    pub mean_velocity: f64,
+    /// Mass of the free grains [kg].
+    pub mass: f64,
+    /// Height of their centre of mass [m].
+    pub mean_height: f64,
+}
+
+impl SeriesPoint {
+    pub(super) fn of(snapshot: &Snapshot) -> Self {
+        let (mut mass, mut energy, mut momentum, mut height) = (0.0, 0.0, 0.0, 0.0);
+        for g in snapshot.grains.iter().filter(|g| !g.fixed) {
+            let spin = 0.4 * g.radius * g.radius * g.spin.norm_squared();
+            mass += g.mass;
+            energy += 0.5 * g.mass * (g.velocity.norm_squared() + spin);
+            momentum += g.mass * g.velocity.x;
+            height += g.mass * g.position.z;
+        }
+        // `new` has made sure that there is a free grain.
+        Self {
+            time: snapshot.time,
+            kinetic_energy: energy,
+            mean_velocity: momentum / mass,
+            mass,
+            mean_height: height / mass,
+        }
+    }
+}
+
+/// What a run cost.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Cost {
+    /// Steps.
+    pub steps: u64,
+    /// Steps times grains, fixed ones included.
+    pub grain_steps: u64,
+    /// Time on the clock [s].
+    pub wall_s: f64,
+}
+
+/// Result of one run.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct InclineResult {
+    /// Slope [degrees].
+    pub slope_degrees: f64,
+    /// What the run was for.
+    pub purpose: Purpose,
+    /// How it started.
+    pub start: Start,
+    /// How it ended.
+    pub outcome: Outcome,
+    /// Test of the mean velocity over the averaging time (without one: over the second half of the run).
+    pub steady: SteadyTest,
+    /// Distance travelled downslope, mean over the grains [m].
+    pub distance: f64,
+    /// Series of energy and mean velocity.
+    pub series: Vec<SeriesPoint>,
+    /// Averages, if the run came to averaging and still moved.
+    pub profile: Option<Profile>,
+    /// Mass and momentum balance of the averages.
+    pub checks: Option<BalanceCheck>,
+    /// Local points (I, μ, φ) of the profile.
+    pub points: Vec<LocalPoint>,
+    /// Height of the flow [m]; of the bed, without a profile.
+    pub height: f64,
+    /// Cost.
+    pub cost: Cost,
+    /// Largest overlap over the radius.
+    pub largest_overlap: f64,
+    /// Hash of the last state's bits.
+    pub state_hash: String,
+}
+
+/// Loses more than this share of its mean speed over the second half of a run: it is about to stop.
+const STOPPING_DRIFT: f64 = -0.5;
+
+impl InclineResult {
+    /// Does the bed flow at this slope? A run whose time was over counts as a flow unless it was about to stop
+    /// (more than half of its mean speed lost over the second half); started from rest, it counts as a flow
+    /// only if it moved on by a diameter.
+    pub fn flows(&self) -> bool {
+        match (self.outcome, self.start) {
+            (Outcome::Rest, _) => false,
+            (Outcome::Steady | Outcome::Accelerating, _) => true,
+            (Outcome::Decelerating | Outcome::Undecided, Start::Flow { .. }) => {
+                self.steady.drift > STOPPING_DRIFT
+            }
+            (Outcome::Decelerating | Outcome::Undecided, Start::Rest) => {
+                self.purpose == Purpose::Measure && self.steady.drift > STOPPING_DRIFT
+            }
+        }
+    }
+}
