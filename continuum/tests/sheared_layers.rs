@@ -1,4 +1,6 @@
 //! Plane shear and the vertical chute against their exact solutions.
+// A helper of a test may panic like the test itself.
+#![allow(clippy::unwrap_used)]
 
 use std::ops::ControlFlow;
 

@@ -4,7 +4,8 @@
 
 use crate::discretisation::{COMPONENTS, Discretisation};
 use crate::error::Error;
-use crate::linear_solver::SparseSystem;
+use crate::grid::Axis;
+use crate::linear_solver::{Method, SparseSystem};
 
 /// The matrix of a step with the places of its coefficients.
 pub(super) struct StepMatrix {
@@ -17,7 +18,9 @@ pub(super) struct StepMatrix {
 }
 
 impl StepMatrix {
-    pub(super) fn new(discretisation: &Discretisation) -> Result<Self, Error> {
+    /// The matrix of one grid, to be solved to a relative residual `tolerance` where it is solved
+    /// iteratively.
+    pub(super) fn new(discretisation: &Discretisation, tolerance: f64) -> Result<Self, Error> {
         let velocities = discretisation.grid().velocities();
         let size = velocities + discretisation.grid().cells();
         let mut entries: Vec<(usize, usize)> = (0..velocities).map(|j| (j, j)).collect();
@@ -32,7 +35,8 @@ impl StepMatrix {
                 entries.extend(cells.iter().map(|&cell| (row, velocities + cell)));
             }
         }
-        let (system, slots) = SparseSystem::new(size, &entries)?;
+        let (system, slots) =
+            SparseSystem::new(size, &entries, method_for(discretisation, tolerance))?;
         let (mass, rest) = slots.split_at(velocities);
         let (divergence, points) = rest.split_at(2 * discretisation.divergence().len());
         Ok(Self {
@@ -78,6 +82,24 @@ impl StepMatrix {
                     values[slot] += by_pressure * weight;
                 }
             }
+        }
+    }
+}
+
+/// δ of the preconditioner, as a fraction of the cell volume: small against the cell volume over the
+/// largest viscosity where matter flows, large enough for factors without pivoting.
+const PRESSURE_REGULARISATION: f64 = 1e-8;
+
+/// Flows along one axis have narrow bands and are solved directly.
+fn method_for(discretisation: &Discretisation, tolerance: f64) -> Method {
+    let grid = discretisation.grid();
+    if grid.axes().contains(&Axis::Flat) {
+        Method::Direct
+    } else {
+        Method::Preconditioned {
+            definite: grid.velocities(),
+            regularisation: PRESSURE_REGULARISATION * grid.cell_volume(),
+            tolerance,
         }
     }
 }

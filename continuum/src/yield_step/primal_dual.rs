@@ -58,6 +58,10 @@ const SMALLEST_STRAIN_RATE_FLOOR: f64 = 1e-7;
 /// a cold start.
 const WARM_ITERATIONS: usize = 12;
 
+/// Relative residual to which the linear system of a Newton iteration is solved when it is solved
+/// iteratively: a tighter one saves no iteration.
+const NEWTON_TOLERANCE: f64 = 1e-3;
+
 /// The law linearised at one quadrature point.
 #[derive(Debug, Clone, Copy, Default)]
 struct LinearisedPoint {
@@ -115,7 +119,7 @@ impl PrimalDual {
         let cells = discretisation.grid().cells();
         Ok(Self {
             options,
-            matrix: StepMatrix::new(discretisation)?,
+            matrix: StepMatrix::new(discretisation, NEWTON_TOLERANCE)?,
             trial: FlowState::at_rest(discretisation, vec![0.0; cells]),
             points: vec![LinearisedPoint::default(); discretisation.points().len()],
             right_hand_side: vec![0.0; velocities + cells],

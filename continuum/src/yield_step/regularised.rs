@@ -35,6 +35,9 @@ impl Default for RegularisedOptions {
     }
 }
 
+/// Relative residual of the linear system, which is all there is to converge in a pass.
+const LINEAR_TOLERANCE: f64 = 1e-10;
+
 /// Solver of time steps with a viscosity of limited size.
 ///
 /// A step counts as converged after its passes, as it does in the codes that work this way; the
@@ -73,7 +76,7 @@ impl RegularisedViscosity {
         let size = discretisation.grid().velocities() + cells;
         Ok(Self {
             options,
-            matrix: StepMatrix::new(discretisation)?,
+            matrix: StepMatrix::new(discretisation, LINEAR_TOLERANCE)?,
             trial: FlowState::at_rest(discretisation, vec![0.0; cells]),
             viscosity: vec![0.0; discretisation.points().len()],
             right_hand_side: vec![0.0; size],

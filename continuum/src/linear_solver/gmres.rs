@@ -1,0 +1,174 @@
+//! Restarted GMRES with right preconditioning (Saad & Schultz, *SIAM J. Sci. Stat. Comput.* 7
+//! (1986) 856), with sums in a fixed order.
+
+/// Directions kept before a restart.
+const DIRECTIONS: usize = 40;
+/// Restarts before the iteration is given up.
+const CYCLES: usize = 3;
+
+/// Work arrays of the iteration for one system size.
+pub(super) struct Gmres {
+    basis: Vec<Vec<f64>>,
+    work: Vec<f64>,
+    /// Upper triangle of the rotated Hessenberg matrix, by columns.
+    triangle: Vec<Vec<f64>>,
+    rotations: Vec<[f64; 2]>,
+    reduced: Vec<f64>,
+    tolerance: f64,
+}
+
+fn dot(a: &[f64], b: &[f64]) -> f64 {
+    a.iter().zip(b).map(|(a, b)| a * b).sum()
+}
+
+impl Gmres {
+    /// An iteration for systems of `size` unknowns that ends at a residual of `tolerance` times the
+    /// right-hand side.
+    pub(super) fn new(size: usize, tolerance: f64) -> Self {
+        Self {
+            tolerance,
+            basis: vec![vec![0.0; size]; DIRECTIONS + 1],
+            work: vec![0.0; size],
+            triangle: vec![vec![0.0; DIRECTIONS + 1]; DIRECTIONS],
+            rotations: vec![[1.0, 0.0]; DIRECTIONS],
+            reduced: vec![0.0; DIRECTIONS + 1],
+        }
+    }
+
+    /// Solves A x = b from x = 0; returns whether the tolerance was met.
+    pub(super) fn solve(
+        &mut self,
+        multiply: impl Fn(&[f64], &mut [f64]),
+        mut precondition: impl FnMut(&mut [f64]),
+        b: &[f64],
+        x: &mut [f64],
+    ) -> bool {
+        x.fill(0.0);
+        let target = self.tolerance * dot(b, b).sqrt();
+        for _ in 0..CYCLES {
+            multiply(x, &mut self.work);
+            for ((v, b), w) in self.basis[0].iter_mut().zip(b).zip(&self.work) {
+                *v = b - w;
+            }
+            let size = dot(&self.basis[0], &self.basis[0]).sqrt();
+            // Written so that a NaN counts as failure.
+            if size <= target {
+                return true;
+            }
+            if !size.is_finite() {
+                return false;
+            }
+            self.basis[0].iter_mut().for_each(|v| *v /= size);
+            self.reduced.fill(0.0);
+            self.reduced[0] = size;
+            let mut used = 0;
+            while used < DIRECTIONS && self.reduced[used].abs() > 0.5 * target {
+                self.extend(used, &multiply, &mut precondition);
+                used += 1;
+            }
+            self.add_combination(used, &mut precondition, x);
+        }
+        multiply(x, &mut self.work);
+        let miss: f64 = b
+            .iter()
+            .zip(&self.work)
+            .map(|(b, w)| (b - w) * (b - w))
+            .sum();
+        miss.sqrt() <= target
+    }
+
+    /// Adds one direction A M⁻¹ v, made orthogonal to the others, and rotates its column.
+    fn extend(
+        &mut self,
+        k: usize,
+        multiply: &impl Fn(&[f64], &mut [f64]),
+        precondition: &mut impl FnMut(&mut [f64]),
+    ) {
+        self.work.copy_from_slice(&self.basis[k]);
+        precondition(&mut self.work);
+        let (known, next) = self.basis.split_at_mut(k + 1);
+        let next = &mut next[0];
+        multiply(&self.work, next);
+        let column = &mut self.triangle[k];
+        for (h, v) in column.iter_mut().zip(known.iter()) {
+            *h = dot(next, v);
+            for (n, v) in next.iter_mut().zip(v) {
+                *n -= *h * v;
+            }
+        }
+        let size = dot(next, next).sqrt();
+        if size > 0.0 {
+            next.iter_mut().for_each(|n| *n /= size);
+        }
+        for (j, [c, s]) in self.rotations[..k].iter().enumerate() {
+            let (upper, lower) = (column[j], column[j + 1]);
+            column[j] = c * upper + s * lower;
+            column[j + 1] = c * lower - s * upper;
+        }
+        let radius = column[k].hypot(size);
+        let [c, s] = if radius > 0.0 {
+            [column[k] / radius, size / radius]
+        } else {
+            [1.0, 0.0]
+        };
+        self.rotations[k] = [c, s];
+        column[k] = radius;
+        self.reduced[k + 1] = -s * self.reduced[k];
+        self.reduced[k] *= c;
+    }
+
+    /// x += M⁻¹ V y with y from the triangular system.
+    fn add_combination(
+        &mut self,
+        used: usize,
+        precondition: &mut impl FnMut(&mut [f64]),
+        x: &mut [f64],
+    ) {
+        for k in (0..used).rev() {
+            let later: f64 = (k + 1..used)
+                .map(|j| self.triangle[j][k] * self.reduced[j])
+                .sum();
+            self.reduced[k] = (self.reduced[k] - later) / self.triangle[k][k];
+        }
+        self.work.fill(0.0);
+        for (v, y) in self.basis[..used].iter().zip(&self.reduced) {
+            for (w, v) in self.work.iter_mut().zip(v) {
+                *w += y * v;
+            }
+        }
+        precondition(&mut self.work);
+        for (x, w) in x.iter_mut().zip(&self.work) {
+            *x += w;
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn nonsymmetric_system_needs_no_more_steps_than_unknowns() {
+        let a = [[4.0, 1.0, 0.0], [-1.0, 3.0, 0.5], [0.0, 2.0, 5.0]];
+        let multiply = |x: &[f64], y: &mut [f64]| {
+            for (y, row) in y.iter_mut().zip(&a) {
+                *y = dot(row, x);
+            }
+        };
+        let mut x = [0.0; 3];
+        let mut calls = 0;
+        let solved = Gmres::new(3, 1e-10).solve(
+            multiply,
+            |x: &mut [f64]| {
+                calls += 1;
+                x[0] /= 4.0;
+            },
+            &[6.0, 6.5, 19.0],
+            &mut x,
+        );
+        assert!(solved && calls <= 4);
+        for (x, expected) in x.iter().zip([1.0, 2.0, 3.0]) {
+            assert!((x - expected).abs() < 1e-9);
+        }
+    }
+}

@@ -1,0 +1,101 @@
+//! LDLᵀ factors of the symmetric quasi-definite part [[K, Cᵀ], [C, −δ]], in minimum-degree order
+//! and without pivoting: quasi-definite matrices have such factors in any order (Vanderbei, *SIAM J.
+//! Optim.* 5 (1995) 100).
+
+use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::linalg::cholesky::ldlt::factor::LdltRegularization;
+use faer::sparse::linalg::cholesky::{
+    LdltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+};
+use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
+use faer::{Conj, MatMut, Par, Side};
+
+use crate::error::Error;
+
+/// LDLᵀ factors of the lower triangle of a matrix of fixed pattern, with −δ on the diagonal of the
+/// second block.
+pub(super) struct QuasiDefinite {
+    symbolic: SymbolicCholesky<usize>,
+    factors: Vec<f64>,
+    values: Vec<f64>,
+    diagonal: Vec<usize>,
+    signs: Vec<i8>,
+    definite: usize,
+    regularisation: f64,
+    scratch: MemBuffer,
+}
+
+/// Pivots smaller than this, or of the wrong sign by round-off, are replaced by it.
+const SMALLEST_PIVOT: f64 = 1e-14;
+
+impl QuasiDefinite {
+    pub(super) fn new(
+        pattern: SymbolicSparseColMatRef<'_, usize>,
+        definite: usize,
+        regularisation: f64,
+        diagonal: Vec<usize>,
+    ) -> Result<Self, Error> {
+        let symbolic = factorize_symbolic_cholesky(
+            pattern,
+            Side::Lower,
+            SymmetricOrdering::Amd,
+            Default::default(),
+        )
+        .map_err(|e| Error::LinearSolver(format!("{e:?}")))?;
+        let need = symbolic
+            .factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default())
+            .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
+        let scratch = MemBuffer::try_new(need)
+            .map_err(|_| Error::LinearSolver("out of memory".to_owned()))?;
+        Ok(Self {
+            factors: vec![0.0; symbolic.len_val()],
+            symbolic,
+            values: vec![0.0; pattern.row_idx().len()],
+            signs: (0..diagonal.len())
+                .map(|i| if i < definite { 1 } else { -1 })
+                .collect(),
+            diagonal,
+            definite,
+            regularisation,
+            scratch,
+        })
+    }
+
+    pub(super) fn factorise(
+        &mut self,
+        pattern: SymbolicSparseColMatRef<'_, usize>,
+        values: &[f64],
+    ) -> Result<(), Error> {
+        self.values.copy_from_slice(values);
+        for &slot in &self.diagonal[self.definite..] {
+            self.values[slot] -= self.regularisation;
+        }
+        self.symbolic
+            .factorize_numeric_ldlt(
+                &mut self.factors,
+                SparseColMatRef::new(pattern, &self.values),
+                Side::Lower,
+                LdltRegularization {
+                    dynamic_regularization_signs: Some(&self.signs),
+                    dynamic_regularization_delta: SMALLEST_PIVOT,
+                    dynamic_regularization_epsilon: SMALLEST_PIVOT,
+                },
+                Par::Seq,
+                MemStack::new(&mut self.scratch),
+                Default::default(),
+            )
+            .map_err(|e| Error::LinearSolver(format!("{e:?}")))?;
+        Ok(())
+    }
+
+    /// Overwrites x with S⁻¹ x; there must be factors.
+    pub(super) fn solve(&mut self, x: &mut [f64]) {
+        let rows = x.len();
+        LdltRef::new(&self.symbolic, &self.factors).solve_in_place_with_conj(
+            Conj::No,
+            MatMut::from_column_major_slice_mut(x, rows, 1),
+            Par::Seq,
+            MemStack::new(&mut self.scratch),
+        );
+    }
+}
