@@ -133,12 +133,7 @@ fn batch<L: Lanes4, I: Interaction>(
     let one = L::splat(1.0);
     // Differences of the vectors, sums of the fourth numbers.
     let minus = L::load(&[-1.0, -1.0, -1.0, 1.0]);
-    let pick = |of: &[[f64; 4]], sign: L| {
-        L::transpose(std::array::from_fn(|k| {
-            L::load(&of[i[k] as usize]) + L::load(&of[j[k] as usize]) * sign
-        }))
-    };
-    let [dx, dy, dz, reach] = pick(field.place, minus);
+    let [dx, dy, dz, reach] = combine(field.place, i, j, minus);
     let mut d = [dx, dy, dz];
     for (k, d) in d.iter_mut().enumerate() {
         let turns = (*d * L::splat(field.inverse_lengths[k])).round();
@@ -153,8 +148,8 @@ fn batch<L: Lanes4, I: Interaction>(
         slots.fill([0.0; 4]);
         return;
     }
-    let [vx, vy, vz, inverse_mass] = pick(field.motion, minus);
-    let [sx, sy, sz, curvature] = pick(field.turn, one);
+    let [vx, vy, vz, inverse_mass] = combine(field.motion, i, j, minus);
+    let [sx, sy, sz, curvature] = combine(field.turn, i, j, one);
     let distance = r2.sqrt();
     let normal = d.scale(one / distance);
     let overlap = reach - distance;
@@ -166,14 +161,12 @@ fn batch<L: Lanes4, I: Interaction>(
     let spins = Vec3([sx, sy, sz]).scale(lever);
     let velocity = Vec3([vx, vy, vz]) - spins.cross(normal);
     let spin = if I::ROLLING {
-        let rows = std::array::from_fn(|k| {
-            let (a, b) = (
-                L::load(&field.turn[i[k] as usize]),
-                L::load(&field.turn[j[k] as usize]),
-            );
-            a * a.splat_last() - b * b.splat_last()
-        });
-        let [x, y, z, _] = L::transpose(rows);
+        let [x, y, z, _] = L::transpose([
+            spin_difference(field.turn, i[0], j[0]),
+            spin_difference(field.turn, i[1], j[1]),
+            spin_difference(field.turn, i[2], j[2]),
+            spin_difference(field.turn, i[3], j[3]),
+        ]);
         Vec3([x, y, z])
     } else {
         Vec3::zero()
@@ -206,6 +199,27 @@ fn batch<L: Lanes4, I: Interaction>(
     }
     let depth = L::select(touching, overlap * curvature * L::splat(0.5), zero);
     *deepest = deepest.max(depth);
+}
+
+// No closures in here: they would be compiled without AVX2, and every operation in them would
+// become a call (measured: three times slower).
+
+/// Rows of `i` plus `sign` times rows of `j`, as lanes.
+#[inline(always)]
+fn combine<L: Lanes4>(of: &[[f64; 4]], i: &[u32], j: &[u32], sign: L) -> [L; 4] {
+    L::transpose([
+        L::load(&of[i[0] as usize]) + L::load(&of[j[0] as usize]) * sign,
+        L::load(&of[i[1] as usize]) + L::load(&of[j[1] as usize]) * sign,
+        L::load(&of[i[2] as usize]) + L::load(&of[j[2] as usize]) * sign,
+        L::load(&of[i[3] as usize]) + L::load(&of[j[3] as usize]) * sign,
+    ])
+}
+
+/// ω_i - ω_j as a row.
+#[inline(always)]
+fn spin_difference<L: Lanes4>(turn: &[[f64; 4]], i: u32, j: u32) -> L {
+    let (a, b) = (L::load(&turn[i as usize]), L::load(&turn[j as usize]));
+    a * a.splat_last() - b * b.splat_last()
 }
 
 /// Writes a vector of four contacts as row `row` of their slots.

@@ -12,20 +12,41 @@ use crate::setup::{Setup, SetupError, Threads};
 use crate::snapshot::GrainSample;
 use nalgebra::Vector3;
 
-/// The grains flew apart: a position is no longer a number.
+/// The step no longer follows the motion.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
-#[error(
-    "grain {grain} has left the range of numbers at t = {time:e} s: the time step of {timestep:e} s \
-     is too long for the stiffness and speeds of this scene"
-)]
-pub struct Diverged {
-    /// Number of the grain.
-    pub grain: u32,
-    /// When it was found [s].
-    pub time: f64,
-    /// The step [s].
-    pub timestep: f64,
+pub enum Diverged {
+    /// A position is no longer a number.
+    #[error(
+        "grain {grain} has left the range of numbers at t = {time:e} s: the time step of \
+         {timestep:e} s is too long for the stiffness and speeds of this scene"
+    )]
+    Escape {
+        /// Number of the grain.
+        grain: u32,
+        /// When it was found [s].
+        time: f64,
+        /// The step [s].
+        timestep: f64,
+    },
+    /// Grains have run through each other.
+    #[error(
+        "grains overlapped by {overlap:.2} of their radius before t = {time:e} s: the time step of \
+         {timestep:e} s is too long, or the stiffness of {stiffness:e} N/m too low for the speeds"
+    )]
+    Overlap {
+        /// Overlap over twice the reduced radius.
+        overlap: f64,
+        /// When it was found [s].
+        time: f64,
+        /// The step [s].
+        timestep: f64,
+        /// k_n [N/m].
+        stiffness: f64,
+    },
 }
+
+/// An overlap, over twice the reduced radius, that no run of ours means: grains half way through.
+const RUN_THROUGH: f64 = 1.0;
 
 /// Skin of the Verlet list, and reach beyond touching of the batches, in smallest-grain diameters.
 ///
@@ -260,25 +281,35 @@ impl Simulation {
             .plane_contacts
             .outdated(&self.planes, &list.rows, &list.travel, list.age);
         if walls || list.outdated(self.skin) {
-            self.check_finite()?;
+            self.check()?;
             self.store_history();
             self.rebuild();
         } else if list.outdated_since(&self.reach.travel, self.reach.age, self.reach_skin) {
+            self.check()?;
             self.store_history();
             self.renew_reach();
         }
         Ok(())
     }
 
-    fn check_finite(&self) -> Result<(), Diverged> {
+    fn check(&self) -> Result<(), Diverged> {
+        let (time, timestep) = (self.time(), self.timestep);
+        if self.deepest > RUN_THROUGH {
+            return Err(Diverged::Overlap {
+                overlap: self.deepest,
+                time,
+                timestep,
+                stiffness: self.law.normal.stiffness,
+            });
+        }
         let n = self.grains.len();
-        let far = |x: &[f64; 4]| !x.iter().all(|c| c.abs() < 1e150);
-        match self.grains.place[..n].iter().position(far) {
+        let lost = |x: &[f64; 4]| !x.iter().all(|c| c.abs() < 1e150);
+        match self.grains.place[..n].iter().position(lost) {
             None => Ok(()),
-            Some(i) => Err(Diverged {
+            Some(i) => Err(Diverged::Escape {
                 grain: self.grains.id[i],
-                time: self.time(),
-                timestep: self.timestep,
+                time,
+                timestep,
             }),
         }
     }

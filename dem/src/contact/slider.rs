@@ -69,9 +69,9 @@ mod tests {
         assert_eq!((f, s), (0.0, 0.0));
     }
 
-    /// Random paths under a changing limit: work in ≥ energy stored, at every moment.
-    #[test]
-    fn no_path_takes_out_more_than_was_put_in() {
+    /// Largest excess of the energy stored over the work put in, along random paths under a
+    /// changing limit; and the work.
+    fn excess(damping: f64) -> (f64, f64) {
         let mut seed = 17_u64;
         let mut random = || {
             seed = seed
@@ -79,25 +79,35 @@ mod tests {
                 .wrapping_add(1442695040888963407);
             (seed >> 11) as f64 / (1_u64 << 53) as f64 - 0.5
         };
-        let (k, c, dt) = (40.0, 0.7, 1e-4);
+        let (k, dt) = (40.0, 1e-4);
         let mut s = Vec3::zero();
         let (mut work, mut u) = (0.0, Vec3([1.0, 0.0, 0.0]));
-        let mut worst: f64 = 0.0;
+        let mut worst = f64::NEG_INFINITY;
         for step in 0..200_000 {
             if step % 500 == 0 {
                 u = Vec3([8.0 * random(), 8.0 * random(), 8.0 * random()]);
             }
             let limit = 3.0 * (1.0 + (step as f64 * 0.003).sin());
             s = s + u.scale(dt);
-            let (f, left) = slide(s, u, k, c, limit);
+            let (f, left) = slide(s, u, k, damping, limit);
             assert!(f.norm() <= limit * (1.0 + 1e-12));
             s = left;
-            // Mid-point work of the elastic part: what is left is only the scheme's own error.
             work += f.dot(u) * dt;
-            let stored = 0.5 * k * s.dot(s);
-            worst = worst.max(stored - work);
+            worst = worst.max(0.5 * k * s.dot(s) - work);
         }
+        (worst, work)
+    }
+
+    #[test]
+    fn no_path_takes_out_more_than_was_put_in() {
+        let (worst, work) = excess(0.7);
         assert!(work > 1.0);
         assert!(worst < 1e-9, "stored exceeds work by {worst:e}");
+    }
+
+    #[test]
+    fn a_dashpot_of_the_wrong_sign_is_caught() {
+        let (worst, _) = excess(-0.7);
+        assert!(worst > 1e-2, "{worst:e}");
     }
 }
