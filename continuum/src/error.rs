@@ -24,7 +24,8 @@ pub enum Error {
     /// A time step did not converge, not even after it had been cut many times.
     #[error(
         "no convergence at t = {time} (natural units): time step cut down to {dt}, \
-         residuals: momentum {momentum:e}, divergence {divergence:e}, stress {stress:e}"
+         residuals: momentum {momentum:e}, divergence {divergence:e}, stress {stress:e} \
+         at strain-rate floor {strain_rate_floor:e}"
     )]
     NotConverged {
         /// Time at the start of the step, in natural units of the flow.
@@ -37,6 +38,8 @@ pub enum Error {
         divergence: f64,
         /// Largest stress residual of the last attempt.
         stress: f64,
+        /// Strain-rate floor that the last attempt had come down to.
+        strain_rate_floor: f64,
     },
     /// The steady state was not reached within the allowed number of steps.
     #[error(

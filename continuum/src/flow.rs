@@ -215,6 +215,7 @@ impl<R: Rheology> Flow<R> {
             momentum: work.residuals.momentum,
             divergence: work.residuals.divergence,
             stress: work.residuals.stress,
+            strain_rate_floor: work.residuals.strain_rate_floor,
         })
     }
 

@@ -17,6 +17,26 @@
 //! # Cases with exact solutions
 //! [`bagnold`] (a layer on an incline), [`plane_shear`] (between plates under a load) and
 //! [`vertical_chute`] (between vertical walls, with a rigid plug).
+//!
+//! ```
+//! use std::ops::ControlFlow;
+//!
+//! use colluvium_continuum::bagnold::BagnoldCase;
+//! use colluvium_continuum::layer::Options;
+//! use colluvium_continuum::rheology::MuI;
+//!
+//! let layer = BagnoldCase {
+//!     slope: 25.0_f64.to_radians(),
+//!     depth: 0.1,
+//!     gravity: 9.81,
+//!     rheology: MuI::new(0.382, 0.643, 0.279, 0.5e-3, 0.6, 2500.0),
+//!     cells: 64,
+//!     columns: None,
+//! };
+//! let flow = layer.solve(&Options::default(), &mut |_| ControlFlow::Continue(()))?;
+//! assert!(flow.velocity_error_l2_relative < 1e-4);
+//! # Ok::<(), colluvium_continuum::Error>(())
+//! ```
 
 pub mod bagnold;
 pub mod discretisation;

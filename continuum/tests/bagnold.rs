@@ -373,6 +373,50 @@ fn bad_input_is_refused_by_name() {
     ));
 }
 
+fn one_step(max_iterations: usize, dt: f64) -> Result<BagnoldSolution, Error> {
+    let mut options = Options {
+        method: YieldMethod::PrimalDual(PrimalDualOptions {
+            max_iterations,
+            ..PrimalDualOptions::default()
+        }),
+        ..Options::default()
+    };
+    options.marching.time_step = dt;
+    options.marching.end_time = Some(dt);
+    reference(32).solve(&options, &mut |_| ControlFlow::Continue(()))
+}
+
+/// With too few iterations allowed for the fast descent, the slow one with line search finds the
+/// same state.
+#[test]
+fn line_search_finds_the_same_state() {
+    let (fast, slow) = (one_step(40, 0.1).unwrap(), one_step(10, 0.1).unwrap());
+    assert!(fast.linear_solves < 20 && slow.linear_solves > 20);
+    assert_eq!(slow.steps, 1);
+    for (a, b) in fast.u.iter().zip(&slow.u) {
+        assert!((a - b).abs() < 1e-6 * fast.max_speed, "{a} {b}");
+    }
+}
+
+#[test]
+fn step_that_does_not_converge_is_halved() {
+    let halved = one_step(8, 0.01).unwrap();
+    assert_eq!((halved.steps, halved.history[0].dt), (2, 0.005));
+    assert!((halved.history[1].time - 0.01).abs() < 1e-15);
+    assert!(halved.history.iter().all(|r| r.residuals.momentum < 1e-9));
+}
+
+#[test]
+fn step_that_cannot_converge_is_an_error() {
+    let Err(Error::NotConverged {
+        strain_rate_floor, ..
+    }) = one_step(3, 0.01)
+    else {
+        panic!("a step was accepted");
+    };
+    assert!(strain_rate_floor > 1e-6);
+}
+
 #[test]
 fn caller_may_stop_a_run() {
     let mut options = Options::default();

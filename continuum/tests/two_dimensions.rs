@@ -62,22 +62,30 @@ fn axes_are_interchangeable() {
     }
 }
 
-/// Grains in a rough box, tilted by less than the static angle, stay where they are.
+/// Matter in a rough box, tilted against gravity, with a free surface.
+fn tilted_box(tangent: f64) -> Flow<MuI> {
+    let slope = tangent.atan();
+    flow(
+        [
+            bounded(24, 2.0, WALL, WALL),
+            bounded(12, 1.0, WALL, Boundary::FreeSurface),
+        ],
+        [slope.sin(), -slope.cos()],
+        |z| slope.cos() * (1.0 - z),
+    )
+}
+
 #[test]
-fn tilted_box_rests_below_the_static_angle() {
-    let slope = 0.2_f64.atan();
+fn tilted_box_rests_below_the_static_angle_and_flows_above() {
     for dt in [0.05, 1e3] {
-        let mut box_flow = flow(
-            [
-                bounded(24, 2.0, WALL, WALL),
-                bounded(12, 1.0, WALL, Boundary::FreeSurface),
-            ],
-            [slope.sin(), -slope.cos()],
-            |z| slope.cos() * (1.0 - z),
-        );
-        let record = box_flow.step(dt).unwrap();
-        assert_eq!(record.dt, dt);
-        assert!(box_flow.max_speed() < 2e-5, "{:e}", box_flow.max_speed());
+        for tangent in [0.1, 0.25, 0.31] {
+            let mut resting = tilted_box(tangent);
+            assert_eq!(resting.step(dt).unwrap().dt, dt);
+            assert!(resting.max_speed() < 5e-6, "{:e}", resting.max_speed());
+        }
+        let mut flowing = tilted_box(0.5);
+        assert_eq!(flowing.step(dt).unwrap().dt, dt);
+        assert!(flowing.max_speed() > 5e-3, "{:e}", flowing.max_speed());
     }
 }
 
