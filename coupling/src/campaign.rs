@@ -131,11 +131,20 @@ pub fn evaluate(
         .filter_map(|r| {
             let slope = r.slope_degrees.to_radians();
             let profile = r.profile.as_ref()?;
-            Some(VelocityProfile::of(profile, slope, spec.base.gravity, spec.base.diameter))
+            Some(VelocityProfile::of(
+                profile,
+                slope,
+                spec.base.gravity,
+                spec.base.diameter,
+            ))
         })
         .collect();
-    let fits = [Stress::MeanPressure, Stress::NormalPressure, Stress::TangentOfSlope]
-        .map(|stress| fit_mu_i(&points, stress));
+    let fits = [
+        Stress::MeanPressure,
+        Stress::NormalPressure,
+        Stress::TangentOfSlope,
+    ]
+    .map(|stress| fit_mu_i(&points, stress));
     let estimators = estimator_fits(&profiles);
     // A flow that was to be measured and stopped, or went on, tells about the stop as well.
     let stop_bracket_degrees = bracket(stop_runs.iter().chain(&flows));
@@ -158,7 +167,11 @@ pub fn evaluate(
     });
     let [fit, fit_zz, fit_slope] = fits.map(Result::ok);
     CampaignResult {
-        runs: flows.into_iter().chain(stop_runs).chain(onset_runs).collect(),
+        runs: flows
+            .into_iter()
+            .chain(stop_runs)
+            .chain(onset_runs)
+            .collect(),
         stop_bracket_degrees,
         onset_bracket_degrees,
         points,
@@ -173,7 +186,8 @@ pub fn evaluate(
 
 impl Watch<'_> {
     fn run(&self, spec: InclineSpec) -> Result<InclineResult, CampaignError> {
-        let (slope_degrees, purpose) = (spec.slope.to_degrees(), spec.purpose);
+        let slope_degrees = (spec.slope.to_degrees() * 1e9).round() / 1e9;
+        let purpose = spec.purpose;
         let same_start = |s: &Start| match (s, &spec.start) {
             (Start::Rest, Start::Rest) => true,
             (Start::Flow { inertial_number: a }, Start::Flow { inertial_number: b }) => {
@@ -189,7 +203,10 @@ impl Watch<'_> {
         if let Some(result) = known {
             return Ok(result.clone());
         }
-        (self.events)(CampaignEvent::Started { slope_degrees, purpose });
+        (self.events)(CampaignEvent::Started {
+            slope_degrees,
+            purpose,
+        });
         let mut run = InclineRun::new(spec)?;
         let mut next_event = STEPS_BETWEEN_EVENTS;
         while !run.finished() {
@@ -200,7 +217,11 @@ impl Watch<'_> {
             if run.steps_done() >= next_event {
                 next_event += STEPS_BETWEEN_EVENTS;
                 let fraction = run.progress();
-                (self.events)(CampaignEvent::Progress { slope_degrees, purpose, fraction });
+                (self.events)(CampaignEvent::Progress {
+                    slope_degrees,
+                    purpose,
+                    fraction,
+                });
             }
         }
         let result = run.finish();
@@ -256,9 +277,17 @@ fn search(
 fn bracket<'a>(runs: impl Iterator<Item = &'a InclineResult>) -> Option<(f64, f64)> {
     let (mut resting, mut flowing) = (Vec::new(), Vec::new());
     for run in runs {
-        if run.flows() { &mut flowing } else { &mut resting }.push(run.slope_degrees);
+        if run.flows() {
+            &mut flowing
+        } else {
+            &mut resting
+        }
+        .push(run.slope_degrees);
     }
     let low = resting.into_iter().fold(f64::NEG_INFINITY, f64::max);
-    let high = flowing.into_iter().filter(|a| *a > low).fold(f64::INFINITY, f64::min);
+    let high = flowing
+        .into_iter()
+        .filter(|a| *a > low)
+        .fold(f64::INFINITY, f64::min);
     (low.is_finite() && high.is_finite()).then_some((low, high))
 }

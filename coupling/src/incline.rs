@@ -45,8 +45,10 @@ pub struct InclineRun {
     series: Vec<SeriesPoint>,
     /// Index into `series` where averaging began.
     averaging_from: usize,
-    /// Since when the grains have been at rest without a break [s]; negative if they have not.
+    /// Since when the grains have been still without a break [s]; negative if they are not.
     resting_since: f64,
+    /// `distance` at that time [m].
+    distance_at_stop: f64,
     /// ∫ mean velocity dt [m].
     distance: f64,
     wall_s: f64,
@@ -97,6 +99,7 @@ impl InclineRun {
             series: Vec::new(),
             averaging_from: 0,
             resting_since: -1.0,
+            distance_at_stop: 0.0,
             distance: 0.0,
             wall_s: 0.0,
             spec,
@@ -119,7 +122,11 @@ impl InclineRun {
             let done = self.simulation.steps_done();
             let to_sample = self.spec.sample_every - done % self.spec.sample_every;
             self.simulation.advance(to_sample.min(last - done))?;
-            if self.simulation.steps_done() % self.spec.sample_every == 0 {
+            if self
+                .simulation
+                .steps_done()
+                .is_multiple_of(self.spec.sample_every)
+            {
                 self.sample();
             }
         }
@@ -153,26 +160,25 @@ impl InclineRun {
         }
     }
 
-    /// At rest: kinetic energy per grain below 10⁻⁶ m g d and mean velocity below 10⁻⁴ √(gd), for 2 √(d/g).
+    /// At rest: kinetic energy per grain below 10⁻³ m g d, and the grains no further than 10⁻² d from where they
+    /// were 5 √(d/g) before. A bed that has stopped rings like a bell, its long waves hardly damped, so neither
+    /// velocity nor energy at one instant tells; and a bed just tilted also starts out still.
     fn rests(&mut self, point: &SeriesPoint) -> bool {
         let (g, d) = (self.spec.gravity, self.spec.diameter);
-        let still = point.kinetic_energy < 1e-6 * point.mass * g * d
-            && point.mean_velocity.abs() < 1e-4 * (g * d).sqrt();
-        if !still {
-            self.resting_since = -1.0;
+        let window = 5.0 * (d / g).sqrt();
+        let still = point.kinetic_energy < 1e-3 * point.mass * g * d;
+        let moved = (self.distance - self.distance_at_stop).abs() > 1e-2 * d;
+        if !still || moved || self.resting_since < 0.0 {
+            self.resting_since = if still { point.time } else { -1.0 };
+            self.distance_at_stop = self.distance;
             return false;
         }
-        if self.resting_since < 0.0 {
-            self.resting_since = point.time;
-        }
-        let unit = (d / g).sqrt();
-        // A bed just tilted also starts out still.
-        point.time - self.resting_since >= 2.0 * unit && point.time >= 5.0 * unit
+        point.time - self.resting_since >= window
     }
 
     fn end_relaxing(&mut self, point: &SeriesPoint) {
         let t = point.time;
-        let check = self.series.len() % 50 == 0;
+        let check = self.series.len().is_multiple_of(50);
         match self.spec.purpose {
             Purpose::Measure => {
                 let latest = self.spec.max_time - self.spec.average_time;
@@ -207,8 +213,15 @@ impl InclineRun {
     /// Stationarity of the mean velocity from a time on.
     fn test_since(&self, time: f64) -> SteadyTest {
         let from = self.series.partition_point(|p| p.time < time);
-        let velocities: Vec<f64> = self.series[from..].iter().map(|p| p.mean_velocity).collect();
-        steady_test(&velocities, self.spec.sample_interval(), self.spec.steady_tolerance)
+        let velocities: Vec<f64> = self.series[from..]
+            .iter()
+            .map(|p| p.mean_velocity)
+            .collect();
+        steady_test(
+            &velocities,
+            self.spec.sample_interval(),
+            self.spec.steady_tolerance,
+        )
     }
 
     /// Share of the run that is done, from 0 to 1; jumps where a run ends early.
@@ -250,13 +263,27 @@ impl InclineRun {
         let mut record = Record::default();
         record.insert("dem", self.simulation.checkpoint());
         self.averager.save("average", &mut record);
+        record.numbers.insert(
+            "incline.state".into(),
+            vec![
+                self.resting_since,
+                self.distance_at_stop,
+                self.distance,
+                self.wall_s,
+            ],
+        );
+        let flat = self.series.iter().flat_map(|p| {
+            [
+                p.time,
+                p.kinetic_energy,
+                p.mean_velocity,
+                p.mass,
+                p.mean_height,
+            ]
+        });
         record
             .numbers
-            .insert("incline.state".into(), vec![self.resting_since, self.distance, self.wall_s]);
-        let flat = self.series.iter().flat_map(|p| {
-            [p.time, p.kinetic_energy, p.mean_velocity, p.mass, p.mean_height]
-        });
-        record.numbers.insert("incline.series".into(), flat.collect());
+            .insert("incline.series".into(), flat.collect());
         let phase = match self.phase {
             Phase::Relaxing => 0,
             Phase::Averaging => 1,
@@ -267,9 +294,10 @@ impl InclineRun {
             End::Rest => 1,
             End::Moved => 2,
         };
-        record
-            .counts
-            .insert("incline.phase".into(), vec![phase, end, self.averaging_from as u64]);
+        record.counts.insert(
+            "incline.phase".into(),
+            vec![phase, end, self.averaging_from as u64],
+        );
         record
     }
 
@@ -282,12 +310,18 @@ impl InclineRun {
         let simulation = Simulation::resume(spec.setup(), &record.extract("dem"))?;
         let mut run = Self::around(spec, simulation)?;
         run.averager.load("average", record)?;
-        let missing = |name: &str| InclineError::Record(format!("array `{name}` is missing or too short"));
-        let state = record.numbers("incline.state").map_err(InclineError::Record)?;
-        let [resting_since, distance, wall_s] =
+        let missing =
+            |name: &str| InclineError::Record(format!("array `{name}` is missing or too short"));
+        let state = record
+            .numbers("incline.state")
+            .map_err(InclineError::Record)?;
+        let [resting_since, distance_at_stop, distance, wall_s] =
             state.try_into().map_err(|_| missing("incline.state"))?;
-        (run.resting_since, run.distance, run.wall_s) = (resting_since, distance, wall_s);
-        let series = record.numbers("incline.series").map_err(InclineError::Record)?;
+        (run.resting_since, run.distance_at_stop) = (resting_since, distance_at_stop);
+        (run.distance, run.wall_s) = (distance, wall_s);
+        let series = record
+            .numbers("incline.series")
+            .map_err(InclineError::Record)?;
         run.series = series
             .chunks_exact(5)
             .map(|c| SeriesPoint {
@@ -298,7 +332,9 @@ impl InclineRun {
                 mean_height: c[4],
             })
             .collect();
-        let phase = record.counts("incline.phase").map_err(InclineError::Record)?;
+        let phase = record
+            .counts("incline.phase")
+            .map_err(InclineError::Record)?;
         let [phase, end, from] = phase.try_into().map_err(|_| missing("incline.phase"))?;
         run.phase = match phase {
             0 => Phase::Relaxing,
@@ -310,7 +346,9 @@ impl InclineRun {
             1 => End::Rest,
             _ => End::Moved,
         };
-        run.averaging_from = usize::try_from(from).unwrap_or(usize::MAX).min(run.series.len());
+        run.averaging_from = usize::try_from(from)
+            .unwrap_or(usize::MAX)
+            .min(run.series.len());
         Ok(run)
     }
 
@@ -330,12 +368,17 @@ impl InclineRun {
             (End::Time, Trend::Falling) => Outcome::Decelerating,
             (End::Time, Trend::Undecided) => Outcome::Undecided,
         };
-        let slope_degrees = self.spec.slope.to_degrees();
+        // Radians and back leave digits behind that nobody asked for.
+        let slope_degrees = (self.spec.slope.to_degrees() * 1e9).round() / 1e9;
         let averaged = self.averager.samples() > 0 && self.end != End::Rest;
-        let profile =
-            averaged.then(|| self.averager.profile(self.spec.diameter, self.spec.grain_density));
+        let profile = averaged.then(|| {
+            self.averager
+                .profile(self.spec.diameter, self.spec.grain_density)
+        });
         let rules = PointRules::for_diameter(self.spec.diameter);
-        let points = profile.as_ref().map_or_else(Vec::new, |p| local_points(p, slope_degrees, &rules));
+        let points = profile
+            .as_ref()
+            .map_or_else(Vec::new, |p| local_points(p, slope_degrees, &rules));
         let height = profile.as_ref().map_or_else(
             || self.spec.bed_height(),
             |p| flow_height(p, rules.surface_solid_fraction),

@@ -173,7 +173,7 @@ pub fn autocorrelation_time(centred: &[f64]) -> f64 {
         return 1.0;
     }
     let variance = covariance(0);
-    if !(variance > 0.0) {
+    if variance <= 0.0 {
         return 1.0;
     }
     let mut sum = 0.0;

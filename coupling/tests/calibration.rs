@@ -65,7 +65,7 @@ fn coverage(own: f64, common: f64) -> ([f64; 3], [f64; 3], f64) {
             &draw(&mut rng, &WIDE, 12, own, common),
             Stress::MeanPressure,
         )
-        .unwrap();
+        .expect("made-up data can be fitted");
         let pairs = [
             (fit.mu_s, fit.mu_s_error),
             (fit.mu_2, fit.mu_2_error),

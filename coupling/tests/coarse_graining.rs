@@ -101,7 +101,7 @@ fn layers() -> Layering {
 }
 
 fn profile_of<K: Kernel>(kernel: K, snapshot: &Snapshot) -> Profile {
-    let mut averager = Averager::new(kernel, layers()).unwrap();
+    let mut averager = Averager::new(kernel, layers()).expect("layers are sound");
     averager.sample(snapshot);
     averager.profile(0.6, 2600.0)
 }

@@ -372,7 +372,7 @@ fn identifiability(
         ("i_0", p[2], errors[2]),
         ("mu_2 - mu_s", p[1] - p[0], errors[0].hypot(errors[1])),
     ] {
-        if !(error < UNKNOWN * value.abs()) {
+        if error.is_nan() || error >= UNKNOWN * value.abs() {
             reasons.push(format!(
                 "{name} = {value:.3} ± {error:.3} is not known to 50 %"
             ));

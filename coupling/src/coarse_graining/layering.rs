@@ -33,8 +33,7 @@ impl Layering {
     /// How many faces lie at z or below it; the layer that holds z is one less.
     fn count_faces_at_or_below(&self, z: f64) -> usize {
         let guess = (z - self.lower) / self.thickness;
-        // Out of the stack, or not a number.
-        if !(guess >= -1.0) {
+        if guess.is_nan() || guess < -1.0 {
             return 0;
         }
         if guess > self.count as f64 + 1.0 {

@@ -5,8 +5,9 @@ use serde::{Deserialize, Serialize};
 
 /// A mean and its standard error.
 ///
-/// The error is the delete-one-block jackknife over 32 to 63 blocks in time, widened by √((1 + r)/(1 − r)) where
-/// neighbouring blocks are still correlated with r > 0.
+/// The error is the delete-one-block jackknife over 32 to 63 blocks in time, times √((1 + r)/(1 − r)), where r
+/// is what correlation neighbouring blocks still have. r is negative where a flow breathes: the pressure swings
+/// by tens of per cent with a period of about a block, about a mean that the weight holds fixed.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// The mean.
@@ -62,7 +63,7 @@ pub struct BalanceCheck {
     pub mass_relative: f64,
     /// Share of the mass outside the layers.
     pub mass_outside: f64,
-    /// Largest |σ_zz − weight above| over layers that carry at least 5 % of the weight and touch no wall,
+    /// Largest |σ_zz − weight above| over layers that carry at least 10 % of the weight and touch no wall,
     /// relative to the weight above them.
     pub weight_relative: f64,
     /// Largest residual of the balance normal to the plane, wall force and acceleration included, relative to
@@ -201,7 +202,7 @@ fn jackknife_error(without: &[f64]) -> f64 {
     let b = without.len() as f64;
     let mean = without.iter().sum::<f64>() / b;
     let squares: f64 = without.iter().map(|x| (x - mean) * (x - mean)).sum();
-    if !(squares > 0.0) {
+    if squares <= 0.0 {
         return 0.0;
     }
     let neighbours: f64 = without
@@ -209,7 +210,7 @@ fn jackknife_error(without: &[f64]) -> f64 {
         .map(|w| (w[0] - mean) * (w[1] - mean))
         .sum();
     // The estimate of the correlation is low by about 1/b.
-    let r = (neighbours / squares + 1.0 / b).clamp(0.0, 0.9);
+    let r = (neighbours / squares + 1.0 / b).clamp(-0.6, 0.9);
     ((b - 1.0) / b * squares * (1.0 + r) / (1.0 - r)).sqrt()
 }
 
@@ -333,13 +334,13 @@ impl BalanceCheck {
             check.normal_relative = check.normal_relative.max(residual(2).abs() / whole);
             check.downslope_relative = check.downslope_relative.max(residual(0).abs() / whole);
             let weight = -gravity[2] * mass_above;
-            if !any_wall && weight > 0.05 * whole && weight > 0.0 {
+            if !any_wall && weight > 0.1 * whole && weight > 0.0 {
                 let carried = means[k][q::SIGMA_ZZ];
                 check.weight_relative = check.weight_relative.max((carried / weight - 1.0).abs());
             }
             mass_higher += at(field::MASS);
-            for axis in 0..3 {
-                wall_higher[axis] += at(field::WALL + axis);
+            for (axis, force) in wall_higher.iter_mut().enumerate() {
+                *force += at(field::WALL + axis);
             }
         }
         // At the lowest layer everything lies above, but for half of that layer.

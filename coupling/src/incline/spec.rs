@@ -109,11 +109,20 @@ impl InclineSpec {
             if ok && value.is_finite() {
                 Ok(())
             } else {
-                Err(InclineError::OutOfRange { key, value, allowed })
+                Err(InclineError::OutOfRange {
+                    key,
+                    value,
+                    allowed,
+                })
             }
         };
         let degrees = self.slope.to_degrees();
-        check("slope_degrees", degrees, (0.0..90.0).contains(&degrees), "at least 0 and below 90")?;
+        check(
+            "slope_degrees",
+            degrees,
+            (0.0..90.0).contains(&degrees),
+            "at least 0 and below 90",
+        )?;
         for (key, value) in [
             ("gravity", self.gravity),
             ("diameter", self.diameter),
@@ -125,16 +134,41 @@ impl InclineSpec {
         ] {
             check(key, value, value > 0.0, "positive")?;
         }
-        check("relax_time", self.relax_time, self.relax_time >= 0.0, "at least 0 s")?;
-        check("average_time", self.average_time, self.average_time >= 0.0, "at least 0 s")?;
+        check(
+            "relax_time",
+            self.relax_time,
+            self.relax_time >= 0.0,
+            "at least 0 s",
+        )?;
+        check(
+            "average_time",
+            self.average_time,
+            self.average_time >= 0.0,
+            "at least 0 s",
+        )?;
         if self.purpose == Purpose::Measure {
             let needed = self.relax_time + self.average_time;
             let allowed = "at least relax_time + average_time";
-            check("max_time", self.max_time, self.max_time >= needed * (1.0 - 1e-12), allowed)?;
+            check(
+                "max_time",
+                self.max_time,
+                self.max_time >= needed * (1.0 - 1e-12),
+                allowed,
+            )?;
         }
-        check("sample_every", self.sample_every as f64, self.sample_every > 0, "at least 1 step")?;
+        check(
+            "sample_every",
+            self.sample_every as f64,
+            self.sample_every > 0,
+            "at least 1 step",
+        )?;
         if let Start::Flow { inertial_number } = self.start {
-            check("start.inertial_number", inertial_number, inertial_number > 0.0, "positive")?;
+            check(
+                "start.inertial_number",
+                inertial_number,
+                inertial_number > 0.0,
+                "positive",
+            )?;
         }
         let free = self.bed.iter().filter(|g| !g.fixed).count();
         check("grains", free as f64, free > 0, "at least 1 free grain")?;
@@ -142,12 +176,21 @@ impl InclineSpec {
         check("domain.periodic", 0.0, periodic, "periodic in x and y")?;
         // The averages keep an array for every layer: an absurd thickness must not exhaust the memory.
         let layers = self.bed_height() / self.layer;
-        check("layer", self.layer, layers < 10_000.0, "at least 1/10000 of the bed's height")
+        check(
+            "layer",
+            self.layer,
+            layers < 10_000.0,
+            "at least 1/10000 of the bed's height",
+        )
     }
 
     /// Height of the highest free grain's top over z = 0 [m].
     pub fn bed_height(&self) -> f64 {
-        let tops = self.bed.iter().filter(|g| !g.fixed).map(|g| g.position.z + g.radius);
+        let tops = self
+            .bed
+            .iter()
+            .filter(|g| !g.fixed)
+            .map(|g| g.position.z + g.radius);
         tops.fold(0.0, f64::max)
     }
 
