@@ -1,0 +1,315 @@
+//! Error against cost: one scene run with several values of one key.
+
+use crate::failure::Failure;
+use crate::report;
+use crate::run::{self, RunOptions};
+use crate::run_directory::{self, RunDirectory};
+use crate::scene::{Scene, SceneBody, SceneError};
+use crate::summary::{Quantity, Status, Summary};
+use crate::table::Table;
+use std::path::{Path, PathBuf};
+
+/// A scene, the values of one key, and what to compare with.
+#[derive(Clone, Debug)]
+pub struct Comparison {
+    scene: Scene,
+    /// The key that varies.
+    key: String,
+    /// Its values as written, and the scene with each.
+    variants: Vec<(String, Scene)>,
+    /// The run that counts as right; none where the scene has an exact solution.
+    reference: Option<Scene>,
+}
+
+/// One run of a comparison.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Row {
+    /// The key's value as written.
+    pub value: String,
+    /// Relative error.
+    pub error: f64,
+    /// Observed order between this and the run before.
+    pub order: Option<f64>,
+    /// Wall time [s].
+    pub wall_s: f64,
+    /// Grain-steps and cell-steps.
+    pub steps: u64,
+}
+
+impl Comparison {
+    /// Checks the key, each of its values and the reference.
+    pub fn new(scene: Scene, vary: &str, reference: &[String]) -> Result<Comparison, Failure> {
+        let malformed = || {
+            Failure::Input(format!(
+                "--vary {vary}: wanted KEY=A,B,C with at least two values, as in `--vary grid.cells=16,32,64`"
+            ))
+        };
+        let (key, values) = vary.split_once('=').ok_or_else(malformed)?;
+        let values: Vec<&str> = values.split(',').map(str::trim).collect();
+        if values.len() < 2 || key.trim().is_empty() || values.iter().any(|v| v.is_empty()) {
+            return Err(malformed());
+        }
+        let key = key.trim().to_owned();
+        let variants = values
+            .iter()
+            .map(|value| {
+                let variant = scene.with(&[format!("{key}={value}")])?;
+                Ok(((*value).to_owned(), variant))
+            })
+            .collect::<Result<Vec<_>, SceneError>>()?;
+        let reference = if reference.is_empty() {
+            None
+        } else {
+            Some(scene.with(reference)?)
+        };
+        if reference.is_none() && !has_exact_solution(&scene) {
+            return Err(Failure::Input(format!(
+                "pareto {}: this scene has no exact solution; say what to compare with, as in `--reference timestep.steps_per_contact=100`",
+                scene.name
+            )));
+        }
+        Ok(Comparison {
+            scene,
+            key,
+            variants,
+            reference,
+        })
+    }
+
+    /// Makes all runs; gives the table as text.
+    pub fn run(&self, out: Option<PathBuf>, threads: Option<usize>) -> Result<String, Failure> {
+        crate::interruption::listen();
+        let name = format!("{}-pareto", self.scene.name);
+        let place = run_directory::place(out.as_deref(), &name);
+        let directory = RunDirectory::create(&place, &self.scene)?;
+        let made = self.run_all(&directory, threads);
+        let rows = match made {
+            Ok(rows) => rows,
+            Err(failure @ (Failure::Scene(_) | Failure::Input(_))) => {
+                directory.abandon();
+                return Err(failure);
+            }
+            Err(failure) => return Err(failure),
+        };
+        let table = self.table(&rows);
+        directory.write_table(&table)?;
+        let mut summary = Summary::begun(&self.scene.name, "pareto");
+        summary.status = Status::Done;
+        summary.cost.wall_s = rows.iter().map(|r| r.wall_s).sum();
+        summary.cost.peak_memory_bytes = crate::cost::peak_memory_bytes();
+        summary
+            .remarks
+            .push(format!("{} against {}", self.key, self.compared_with()));
+        for row in &rows {
+            let label = format!("error at {} = {}", self.key, row.value);
+            summary.put(
+                &label,
+                Quantity::new(row.error, "1").against(0.0, &self.compared_with()),
+            );
+        }
+        if let Some(order) = rows.iter().rev().find_map(|r| r.order) {
+            summary.put(
+                "observed_order",
+                Quantity::new(order, "1").from("between the last two runs"),
+            );
+        }
+        directory.write_summary(&summary)?;
+        report::write(directory.path())?;
+        let mut text = self.text(&rows);
+        text.push_str(&format!(
+            "\n{}",
+            directory.file(run_directory::REPORT).display()
+        ));
+        Ok(text)
+    }
+
+    fn run_all(
+        &self,
+        directory: &RunDirectory,
+        threads: Option<usize>,
+    ) -> Result<Vec<Row>, Failure> {
+        let one = |label: &str, scene: &Scene| -> Result<PathBuf, Failure> {
+            directory.journal.note(&format!("run {label}"));
+            let out = Some(directory.path().join(label));
+            run::run(
+                scene,
+                &RunOptions {
+                    out,
+                    threads,
+                    resume: false,
+                },
+            )
+        };
+        let reference = match &self.reference {
+            Some(scene) => Some(one("reference", scene)?),
+            None => None,
+        };
+        let mut rows: Vec<Row> = Vec::new();
+        for (value, scene) in &self.variants {
+            let path = one(&folder_name(&self.key, value), scene)?;
+            let summary = report::read_summary(&path)?;
+            let error = match &reference {
+                Some(reference) => difference(&path, reference)?,
+                None => exact_error(&summary),
+            };
+            let order = rows
+                .last()
+                .and_then(|before| order_between(before, value, error));
+            rows.push(Row {
+                value: value.clone(),
+                error,
+                order,
+                wall_s: summary.cost.wall_s,
+                steps: summary.cost.grain_steps + summary.cost.cell_steps,
+            });
+        }
+        Ok(rows)
+    }
+
+    fn compared_with(&self) -> String {
+        match &self.reference {
+            Some(_) => "the reference run".to_owned(),
+            None => match self.scene.body {
+                SceneBody::Bagnold(_) => "exact profile, relative L2 error of u".to_owned(),
+                _ => "restitution of the scene".to_owned(),
+            },
+        }
+    }
+
+    fn table(&self, rows: &[Row]) -> Table {
+        Table::new("pareto")
+            .with(
+                &self.key,
+                "",
+                rows.iter()
+                    .map(|r| r.value.parse().unwrap_or(f64::NAN))
+                    .collect(),
+            )
+            .with("error", "1", rows.iter().map(|r| r.error).collect())
+            .with(
+                "order",
+                "1",
+                rows.iter().map(|r| r.order.unwrap_or(f64::NAN)).collect(),
+            )
+            .with("wall_s", "s", rows.iter().map(|r| r.wall_s).collect())
+            .with("steps", "1", rows.iter().map(|r| r.steps as f64).collect())
+    }
+
+    fn text(&self, rows: &[Row]) -> String {
+        let width = self.key.len().max(12);
+        let mut text = format!(
+            "{:>width$}  {:>12}  {:>8}  {:>10}  {:>14}\n",
+            self.key, "error", "order", "wall [s]", "steps"
+        );
+        for row in rows {
+            let order = row
+                .order
+                .map_or_else(|| "–".to_owned(), |o| format!("{o:.3}"));
+            text.push_str(&format!(
+                "{:>width$}  {:>12.4e}  {:>8}  {:>10.4}  {:>14}\n",
+                row.value, row.error, order, row.wall_s, row.steps
+            ));
+        }
+        text.push_str(&format!("error: {}", self.compared_with()));
+        text
+    }
+}
+
+fn has_exact_solution(scene: &Scene) -> bool {
+    matches!(scene.body, SceneBody::Bagnold(_) | SceneBody::Impact(_))
+}
+
+/// A folder name from a setting; characters that file systems dislike become dashes.
+fn folder_name(key: &str, value: &str) -> String {
+    let plain = |c: char| {
+        if c.is_alphanumeric() || "._-+".contains(c) {
+            c
+        } else {
+            '-'
+        }
+    };
+    format!("{key}-{value}").chars().map(plain).collect()
+}
+
+fn exact_error(summary: &Summary) -> f64 {
+    let value = |name: &str| summary.results.get(name).and_then(|q| q.value);
+    if let Some(error) = value("velocity_error_l2") {
+        return error;
+    }
+    let reference = summary.results.get("restitution").and_then(|q| q.reference);
+    match (value("restitution"), reference) {
+        (Some(value), Some(reference)) => (value - reference).abs() / reference,
+        _ => f64::NAN,
+    }
+}
+
+/// ln(e_1/e_2)/ln(v_2/v_1): positive where the error falls as the value grows.
+fn order_between(before: &Row, value: &str, error: f64) -> Option<f64> {
+    let (a, b): (f64, f64) = (before.value.parse().ok()?, value.parse().ok()?);
+    let order = (before.error / error).ln() / (b / a).ln();
+    order.is_finite().then_some(order)
+}
+
+/// Relative L2 difference of the velocity profile, or of the restitution where there is none.
+fn difference(run: &Path, reference: &Path) -> Result<f64, Failure> {
+    let profile = |path: &Path| Table::from_csv(&path.join("profile.csv")).ok();
+    if let (Some(a), Some(b)) = (profile(run), profile(reference)) {
+        let (a, b) = (a.pairs("z", "u"), b.pairs("z", "u"));
+        let mut miss = 0.0;
+        let mut size = 0.0;
+        for (z, u) in a {
+            if let Some(right) = interpolate(&b, z) {
+                miss += (u - right) * (u - right);
+                size += right * right;
+            }
+        }
+        return Ok((miss / size).sqrt());
+    }
+    let value = |path: &Path| -> Result<f64, Failure> {
+        let summary = report::read_summary(path)?;
+        Ok(summary
+            .results
+            .get("restitution")
+            .and_then(|q| q.value)
+            .unwrap_or(f64::NAN))
+    };
+    let right = value(reference)?;
+    Ok((value(run)? - right).abs() / right.abs())
+}
+
+/// Linear interpolation in points of rising x; none outside of them.
+fn interpolate(points: &[(f64, f64)], x: f64) -> Option<f64> {
+    let after = points.iter().position(|p| p.0 >= x)?;
+    let (x1, y1) = points[after];
+    if x1 == x {
+        return Some(y1);
+    }
+    let (x0, y0) = *points.get(after.checked_sub(1)?)?;
+    Some(y0 + (y1 - y0) * (x - x0) / (x1 - x0))
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_order_of_a_halved_error_is_read_off() {
+        let row = Row {
+            value: "16".into(),
+            error: 4e-3,
+            order: None,
+            wall_s: 1.0,
+            steps: 1,
+        };
+        assert!((order_between(&row, "32", 1e-3).unwrap() - 2.0).abs() < 1e-12);
+        assert_eq!(order_between(&row, "fine", 1e-3), None);
+    }
+
+    #[test]
+    fn interpolation_does_not_go_beyond_its_points() {
+        let points = [(0.0, 0.0), (1.0, 2.0)];
+        assert_eq!(interpolate(&points, 0.25), Some(0.5));
+        assert_eq!(interpolate(&points, 1.5), None);
+        assert_eq!(interpolate(&points, -0.5), None);
+    }
+}

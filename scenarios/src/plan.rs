@@ -1,0 +1,281 @@
+//! The plan of a scene: what would be modelled and why, what is left out, what it would cost.
+
+use crate::failure::Failure;
+use crate::run;
+use crate::scene::{BagnoldScene, ImpactScene, InclineScene, InclineStart, Scene, SceneBody};
+use colluvium_coupling::incline::{InclineRun, InclineSpec};
+use colluvium_dem::Threads;
+use colluvium_dem::preparation::settle_incline_bed;
+use colluvium_dem::timestep;
+use std::fmt::Write;
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+/// The plan as text.
+pub fn plan(scene: &Scene) -> Result<String, Failure> {
+    match &scene.body {
+        SceneBody::Incline(body) => incline(scene, body),
+        SceneBody::Bagnold(body) => Ok(bagnold(body)),
+        SceneBody::Impact(body) => Ok(impact(scene, body)),
+    }
+}
+
+/// Lines of a plan: a topic and what is said about it.
+#[derive(Default)]
+struct Lines(String);
+
+impl Lines {
+    fn say(&mut self, topic: &str, text: &str) {
+        // Writing to a string does not fail.
+        let _ = writeln!(self.0, "{topic:<16} {text}");
+    }
+}
+
+/// Grains of the small bed on which the rate is measured, and steps.
+const PROBE_GRAINS: u64 = 300;
+const PROBE_STEPS: u64 = 2000;
+
+/// Measures grain-steps per second and thread on a small flow of the same material.
+fn measured_rate(scene: &InclineScene) -> Option<f64> {
+    let mut small = scene.clone();
+    small.grains.count = PROBE_GRAINS;
+    small.scale = 1.0;
+    small.floor.length_diameters = 7.0;
+    small.floor.width_diameters = 5.0;
+    small.start = InclineStart::Flow;
+    // Soft and coarse: only the rate counts, and a soft bed settles in few steps.
+    small.contact.stiffness_scaled = Some(2.0e3);
+    small.contact.stiffness = None;
+    small.contact.stiffness_from_speed = None;
+    let bed = settle_incline_bed(&run::incline::bed(&small), Threads::Serial, &mut |_| {
+        ControlFlow::Continue(())
+    })
+    .ok()?;
+    let spec = InclineSpec {
+        max_time: 1.0e6,
+        ..run::incline::spec(&small, &bed, Threads::Serial)
+    };
+    let mut flow = InclineRun::new(spec).ok()?;
+    let start = Instant::now();
+    flow.advance(PROBE_STEPS).ok()?;
+    Some((flow.steps_done() * bed.grains.len() as u64) as f64 / start.elapsed().as_secs_f64())
+}
+
+fn incline(scene: &Scene, body: &InclineScene) -> Result<String, Failure> {
+    let mut lines = Lines::default();
+    let law = run::incline::law(body);
+    let step = run::incline::step(body);
+    let grains = body.free_grains();
+    let [length, width] = body.floor_edges();
+    let mass = body.mean_mass();
+    let stiffness = law.normal.stiffness;
+    // A dense random packing, for the depth only.
+    let depth = grains as f64 * mass / (body.grains.density * 0.57 * length * width);
+    lines.say(
+        "scene",
+        &format!(
+            "{}: grains on a rough plane at {} degrees",
+            scene.name, body.slope_degrees
+        ),
+    );
+    lines.say(
+        "grains",
+        &format!(
+            "{grains} free over a base of fixed ones, floor {length:.3} m x {width:.3} m periodic, about {:.0} d deep",
+            depth / body.grains.diameter
+        ),
+    );
+    lines.say(
+        "contact law",
+        "linear spring and dashpot, tangential spring with history and Coulomb cap (Thuillet 2019, Eq. 2.1-2.10)",
+    );
+    match &body.contact.rolling {
+        Some(rolling) => lines.say(
+            "rotation",
+            &format!(
+                "yes, with rolling and twisting springs: β = {} stands for angular grains (Eq. 2.11-2.13)",
+                rolling.beta
+            ),
+        ),
+        None => lines.say("rotation", "yes, without rolling resistance: the scene's grains are spheres"),
+    }
+    lines.say("left out", &run::incline::left_out(body).join(", "));
+    lines.say("stiffness", &format!("k_n = {stiffness:.4e} N/m"));
+    let weight = body.grains.density * 0.57 * body.gravity * depth;
+    let pressed = weight * body.grains.diameter.powi(2) / stiffness;
+    let speed = 0.5 * (body.gravity * body.grains.diameter).sqrt();
+    let struck = speed * (mass / stiffness).sqrt();
+    lines.say(
+        "overlap",
+        &format!(
+            "about {:.2} % of the radius under the weight at the base, {:.2} % in impacts at √(g d)/2",
+            100.0 * pressed / (0.5 * body.grains.diameter),
+            100.0 * struck / (0.5 * body.grains.diameter)
+        ),
+    );
+    let smallest = mass * (2.0 * body.smallest_radius() / body.grains.diameter).powi(3);
+    let limit = timestep::stability_limit(&law, smallest);
+    lines.say(
+        "time step",
+        &format!(
+            "{step:.4e} s: {}; {:.0} % of the stability limit of the smallest grain on one spring, {limit:.3e} s",
+            run::incline::step_limit(body),
+            100.0 * step / limit
+        ),
+    );
+    let least = ((body.time.relax + body.time.average) / step).ceil();
+    let most = (body.time.limit / step).ceil();
+    lines.say(
+        "steps",
+        &format!("{least:.3e} if steady after time.relax, at most {most:.3e}"),
+    );
+    let work = least * grains as f64;
+    match measured_rate(body) {
+        Some(rate) => {
+            lines.say(
+                "rate",
+                &format!(
+                    "{rate:.3e} grain-steps/s on one thread, measured now on {PROBE_GRAINS} grains"
+                ),
+            );
+            lines.say(
+                "cost",
+                &format!(
+                    "{work:.3e} to {:.3e} grain-steps: {:.0} s to {:.0} s on one thread, and the settling of the bed",
+                    most * grains as f64,
+                    work / rate,
+                    most * grains as f64 / rate
+                ),
+            );
+        }
+        None => lines.say(
+            "cost",
+            &format!("{work:.3e} grain-steps at least; the rate could not be measured"),
+        ),
+    }
+    let c = &body.calibration;
+    lines.say(
+        "calibrate",
+        &format!(
+            "flows at {:?} degrees, where a flow stops in [{}, {}], where rest ends in [{}, {}]",
+            c.flow_degrees, c.stop.low, c.stop.high, c.onset.low, c.onset.high
+        ),
+    );
+    Ok(lines.0)
+}
+
+fn bagnold(body: &BagnoldScene) -> String {
+    let mut lines = Lines::default();
+    let case = run::bagnold::case(body);
+    let law = case.rheology;
+    let tangent = case.slope.tan();
+    lines.say(
+        "scene",
+        &format!(
+            "bagnold: a layer of μ(I) material, {} m deep, at {} degrees, from rest to steady flow",
+            body.depth, body.slope_degrees
+        ),
+    );
+    lines.say(
+        "rheology",
+        &format!(
+            "μ_s {}, μ_2 {}, I_0 {}, d {} m, φ {}, ρ_s {} kg/m³ ({})",
+            law.mu_s,
+            law.mu_2,
+            law.i_0,
+            law.diameter,
+            law.solid_fraction,
+            law.grain_density,
+            body.rheology.source.as_deref().unwrap_or("by numbers")
+        ),
+    );
+    let columns = body.grid.columns;
+    lines.say(
+        "grid",
+        &format!(
+            "{} cells across the depth, {}",
+            body.cells(),
+            if columns > 1 {
+                format!("{columns} columns periodic downslope")
+            } else {
+                "no downslope axis: nothing varies along it".to_owned()
+            }
+        ),
+    );
+    lines.say("left out", &run::bagnold::LEFT_OUT.join(", "));
+    if tangent <= law.mu_s {
+        lines.say("flow", "none: the slope lies below atan(μ_s)");
+    } else {
+        let inertial_number = law.inertial_number_at(tangent);
+        lines.say(
+            "flow",
+            &format!(
+                "I = {inertial_number:.4} throughout, {:.4} m/s at the surface (exact), {}",
+                case.exact_velocity(body.depth),
+                if law.well_posedness(inertial_number) < 0.0 {
+                    "well posed"
+                } else {
+                    "ill posed in 2D and 3D"
+                }
+            ),
+        );
+        if let Some(remark) = run::bagnold::validity_remark(body, inertial_number) {
+            lines.say("warning", &remark);
+        }
+    }
+    let unit = (body.depth / body.gravity).sqrt();
+    lines.say(
+        "time step",
+        &format!(
+            "{:.4e} s first, growing by {} a step; implicit in pressure, stress and yield: no stability limit",
+            body.solver.timestep_scaled * unit,
+            body.solver.growth
+        ),
+    );
+    lines.say("cost", "well under a second per 1000 cells and 50 steps");
+    lines.0
+}
+
+fn impact(scene: &Scene, body: &ImpactScene) -> String {
+    let mut lines = Lines::default();
+    let pair = scene.name == "two-spheres";
+    let impact = run::impact::prepare(body, pair);
+    let what = if pair {
+        "a sphere hits an equal sphere at rest"
+    } else {
+        "a sphere hits the plane z = 0"
+    };
+    lines.say(
+        "scene",
+        &format!(
+            "{}: {what} at {} m/s, {} degrees from the normal",
+            scene.name, body.speed, body.impact_degrees
+        ),
+    );
+    lines.say("left out", &run::impact::left_out(body).join(", "));
+    lines.say(
+        "contact",
+        &format!(
+            "k_n = {:.4e} N/m, contact time {:.4e} s, largest overlap about {:.2} % of the radius",
+            body.stiffness,
+            impact.contact_time,
+            100.0 * body.speed * (impact.reduced_mass / body.stiffness).sqrt() / body.radius
+        ),
+    );
+    let step = impact.setup.timestep;
+    lines.say(
+        "time step",
+        &format!(
+            "{step:.4e} s: contact time over steps_per_contact = {}",
+            body.steps_per_contact
+        ),
+    );
+    lines.say(
+        "steps",
+        &format!(
+            "{:.0}, well under a second per million",
+            (impact.duration / step).ceil()
+        ),
+    );
+    lines.0
+}

@@ -1,0 +1,188 @@
+//! Plots of single runs and comparisons.
+
+use super::Record;
+use super::page::{figure, number};
+use super::plot::{Mark, Plot};
+use crate::table::Table;
+use maud::{Markup, html};
+
+const WIDTH: u32 = 560;
+const HEIGHT: u32 = 400;
+
+/// All plots that the tables of a run allow.
+pub fn plots(record: &Record) -> Markup {
+    html! {
+        @if let Some(table) = record.table("pareto") { (pareto(&table)) }
+        @if let Some(table) = record.table("trajectory") { (trajectory(&table)) }
+        @if let Some(table) = record.table("profile") {
+            @if table.column("u_exact").is_empty() {
+                (grains(&table, record.table("energy").as_ref()))
+            } @else {
+                (layer(&table, record.table("history").as_ref()))
+            }
+        } @else if let Some(table) = record.table("energy") {
+            h2 { "In time" }
+            div.figures { (energy(&table)) }
+        }
+    }
+}
+
+fn pareto(table: &Table) -> Markup {
+    let mut plot = Plot::new("wall time [s]", "relative error")
+        .with("", Mark::Line, 0, table.pairs("wall_s", "error"))
+        .with("runs", Mark::Dots, 0, table.pairs("wall_s", "error"));
+    (plot.x_log, plot.y_log) = (true, true);
+    let key = table.columns.first().map_or("", |c| c.name.as_str());
+    let mut by_key = Plot::new(key, "relative error")
+        .with("", Mark::Line, 1, table.pairs(key, "error"))
+        .with("runs", Mark::Dots, 1, table.pairs(key, "error"));
+    let points = table.pairs(key, "error");
+    if let Some((x, y)) = points.first().copied().filter(|p| p.0 > 0.0) {
+        let slope = points
+            .iter()
+            .map(|p| (p.0, y * (x / p.0).powi(2)))
+            .collect();
+        by_key = by_key.with("second order", Mark::Dashes, 6, slope);
+    }
+    (by_key.x_log, by_key.y_log) = (true, true);
+    html! {
+        h2 { "Error against cost" }
+        div.figures {
+            (figure(&plot.svg(WIDTH, HEIGHT), "Each point is one run; down and left is better."))
+            (figure(&by_key.svg(WIDTH, HEIGHT), "The error against the key that was varied."))
+        }
+        div.wide {
+            table {
+                tr { @for c in &table.columns { th { (c.name) } } }
+                @for row in 0..table.rows() {
+                    tr {
+                        @for c in &table.columns {
+                            td { (number(c.values.get(row).copied().unwrap_or(f64::NAN))) }
+                        }
+                    }
+                }
+            }
+        }
+    }
+}
+
+fn trajectory(table: &Table) -> Markup {
+    let pair = !table.column("x2").is_empty();
+    let mut velocity = Plot::new("time t [s]", "velocity [m/s]")
+        .with(
+            if pair { "sphere 1, normal" } else { "normal" },
+            Mark::Line,
+            0,
+            table.pairs("t", "vz1"),
+        )
+        .with(
+            if pair {
+                "sphere 1, tangential"
+            } else {
+                "tangential"
+            },
+            Mark::Line,
+            1,
+            table.pairs("t", "vx1"),
+        );
+    let mut spin = Plot::new("time t [s]", "spin about y [rad/s]").with(
+        if pair { "sphere 1" } else { "" },
+        Mark::Line,
+        3,
+        table.pairs("t", "wy1"),
+    );
+    if pair {
+        velocity = velocity
+            .with("sphere 2, normal", Mark::Dashes, 0, table.pairs("t", "vz2"))
+            .with(
+                "sphere 2, tangential",
+                Mark::Dashes,
+                1,
+                table.pairs("t", "vx2"),
+            );
+        spin = spin.with("sphere 2", Mark::Dashes, 3, table.pairs("t", "wy2"));
+    }
+    html! {
+        h2 { "The impact" }
+        div.figures {
+            (figure(&velocity.svg(WIDTH, HEIGHT), "Velocities along the contact normal z and the tangent x."))
+            (figure(&spin.svg(WIDTH, HEIGHT), "Angular velocity about y."))
+        }
+    }
+}
+
+fn layer(profile: &Table, history: Option<&Table>) -> Markup {
+    let velocity = Plot::new("velocity u [m/s]", "height z [m]")
+        .with("exact", Mark::Dashes, 6, profile.pairs("u_exact", "z"))
+        .with("computed", Mark::Dots, 0, profile.pairs("u", "z"));
+    let error: Vec<(f64, f64)> = profile
+        .column("u")
+        .iter()
+        .zip(profile.column("u_exact"))
+        .zip(profile.column("z"))
+        .map(|((u, exact), z)| (u - exact, *z))
+        .collect();
+    let error = Plot::new("u − u exact [m/s]", "height z [m]").with("", Mark::Line, 1, error);
+    html! {
+        h2 { "Profile" }
+        div.figures {
+            (figure(&velocity.svg(WIDTH, HEIGHT), "Velocity through the depth, beside the exact Bagnold profile."))
+            (figure(&error.svg(WIDTH, HEIGHT), "What is left between them."))
+            @if let Some(history) = history {
+                @let plot = Plot::new("time t [s]", "mean velocity [m/s]")
+                    .with("", Mark::Dots, 2, history.pairs("t", "mean_velocity"));
+                @let plot = Plot { x_log: true, ..plot };
+                (figure(&plot.svg(WIDTH, HEIGHT), "From rest to the steady flow; each point is one implicit step."))
+            }
+        }
+    }
+}
+
+fn energy(table: &Table) -> Markup {
+    let mut plot = Plot::new("time t [s]", "kinetic energy [J]").with(
+        "",
+        Mark::Line,
+        1,
+        table.pairs("t", "kinetic_energy"),
+    );
+    plot.from_zero = true;
+    figure(
+        &plot.svg(WIDTH, HEIGHT),
+        "Kinetic energy of the free grains, translation and rotation.",
+    )
+}
+
+fn grains(profile: &Table, in_time: Option<&Table>) -> Markup {
+    let bars = |name: &str| profile.column(name).to_vec();
+    let velocity = Plot::new("velocity u [m/s]", "height z [m]").with(
+        "",
+        Mark::Dots,
+        0,
+        profile.pairs("u", "z"),
+    );
+    let fraction = Plot::new("height z [m]", "solid fraction φ")
+        .with("", Mark::Dots, 2, profile.pairs("z", "phi"))
+        .with_errors(bars("phi_error"));
+    let stress = Plot::new("stress [Pa]", "height z [m]")
+        .with("σ_zz", Mark::Line, 0, profile.pairs("sigma_zz", "z"))
+        .with(
+            "p, a third of the trace",
+            Mark::Line,
+            2,
+            profile.pairs("p", "z"),
+        )
+        .with("|τ|", Mark::Line, 1, profile.pairs("tau", "z"));
+    let friction = Plot::new("inertial number I", "friction μ")
+        .with("|τ|/p", Mark::Dots, 0, profile.pairs("i", "mu"))
+        .with("|τ|/σ_zz", Mark::Dots, 1, profile.pairs("i", "mu_zz"));
+    html! {
+        h2 { "Through the depth" }
+        div.figures {
+            (figure(&velocity.svg(WIDTH, HEIGHT), "Mean velocity downslope in layers."))
+            (figure(&stress.svg(WIDTH, HEIGHT), "Stress, contact and kinetic parts together."))
+            (figure(&fraction.svg(WIDTH, HEIGHT), "Solid fraction with standard errors."))
+            (figure(&friction.svg(WIDTH, HEIGHT), "Friction against inertial number, all layers."))
+            @if let Some(table) = in_time { (energy(table)) }
+        }
+    }
+}

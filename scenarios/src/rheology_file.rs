@@ -1,0 +1,197 @@
+//! `rheology.toml`: a μ(I) law with its errors, its validity and its provenance.
+
+use crate::scene::SceneError;
+use serde::{Deserialize, Serialize};
+use std::path::Path;
+use toml::{Table, Value};
+
+/// Keys of a scene that a rheology file takes the place of.
+pub const ALTERNATIVES: &[&[&str]] = &[
+    &["rheology.file", "rheology.mu_s"],
+    &["rheology.file", "rheology.mu_2"],
+    &["rheology.file", "rheology.i_0"],
+    &["rheology.file", "rheology.diameter"],
+    &["rheology.file", "rheology.solid_fraction"],
+    &["rheology.file", "rheology.grain_density"],
+    &["rheology.file", "rheology.valid_i"],
+    &["rheology.file", "rheology.source"],
+];
+
+/// A fitted rheology as it stands in a file; SI units.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct RheologyFile {
+    /// Friction at I → 0.
+    pub mu_s: f64,
+    /// Its standard error.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mu_s_error: Option<f64>,
+    /// Friction at I → ∞.
+    pub mu_2: f64,
+    /// Its standard error.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mu_2_error: Option<f64>,
+    /// Inertial number half way between.
+    pub i_0: f64,
+    /// Its standard error.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub i_0_error: Option<f64>,
+    /// Grain diameter [m].
+    pub diameter: f64,
+    /// Solid volume fraction in the flow.
+    pub solid_fraction: f64,
+    /// Its standard error.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub solid_fraction_error: Option<f64>,
+    /// Density of the grains [kg/m³].
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub grain_density: Option<f64>,
+    /// Inertial numbers between which the law was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub valid_i: Option<[f64; 2]>,
+    /// Covariance of (mu_s, mu_2, i_0).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub covariance: Option<[[f64; 3]; 3]>,
+    /// The same fit for |τ|/σ_zz in place of |τ|/p.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mu_zz: Option<FitRow>,
+    /// Where the numbers come from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub provenance: Option<Provenance>,
+}
+
+/// One fit of μ(I) with standard errors.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct FitRow {
+    /// Friction at I → 0.
+    pub mu_s: f64,
+    /// Its standard error.
+    pub mu_s_error: f64,
+    /// Friction at I → ∞.
+    pub mu_2: f64,
+    /// Its standard error.
+    pub mu_2_error: f64,
+    /// Inertial number half way between.
+    pub i_0: f64,
+    /// Its standard error.
+    pub i_0_error: f64,
+}
+
+/// How a rheology was measured.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Provenance {
+    /// Version of Colluvium.
+    pub version: String,
+    /// The scene.
+    pub scene: String,
+    /// Angles of the runs the fit uses [degrees].
+    pub flow_degrees: Vec<f64>,
+    /// Seed of the bed.
+    pub seed: u64,
+    /// Which friction is meant.
+    pub friction: String,
+    /// Whether the law describes the material, in words.
+    pub verdict: String,
+}
+
+impl RheologyFile {
+    /// Reads and checks a file.
+    pub fn read(path: &Path) -> Result<RheologyFile, SceneError> {
+        let fail = |message: String| SceneError::Rheology {
+            path: path.display().to_string(),
+            message,
+        };
+        let text = std::fs::read_to_string(path)
+            .map_err(|error| fail(format!("cannot read the file: {error}")))?;
+        let law: RheologyFile =
+            toml::from_str(&text).map_err(|error| fail(error.to_string().trim().to_owned()))?;
+        law.check().map_err(fail)?;
+        Ok(law)
+    }
+
+    fn check(&self) -> Result<(), String> {
+        let least = |key: &str, value: f64, above: f64| {
+            if value.is_finite() && value > above {
+                Ok(())
+            } else {
+                Err(format!(
+                    "key `{key}` = {value} is not allowed; allowed: ({above}, inf)"
+                ))
+            }
+        };
+        if !(self.mu_s >= 0.0 && self.mu_s.is_finite()) {
+            return Err(format!(
+                "key `mu_s` = {} is not allowed; allowed: [0, inf)",
+                self.mu_s
+            ));
+        }
+        if !(self.mu_2 >= self.mu_s && self.mu_2.is_finite()) {
+            return Err(format!(
+                "key `mu_2` = {} is not allowed; allowed: at least mu_s = {}",
+                self.mu_2, self.mu_s
+            ));
+        }
+        least("i_0", self.i_0, 0.0)?;
+        least("diameter", self.diameter, 0.0)?;
+        least("solid_fraction", self.solid_fraction, 0.0)?;
+        if self.solid_fraction > 1.0 {
+            return Err(format!(
+                "key `solid_fraction` = {} is not allowed; allowed: (0, 1]",
+                self.solid_fraction
+            ));
+        }
+        if let Some(density) = self.grain_density {
+            least("grain_density", density, 0.0)?;
+        }
+        if let Some([low, high]) = self.valid_i
+            && !(low >= 0.0 && high > low && high.is_finite())
+        {
+            return Err(format!(
+                "key `valid_i` = [{low}, {high}] is not allowed; allowed: [low, high] with 0 <= low < high"
+            ));
+        }
+        Ok(())
+    }
+
+    /// The file's text.
+    pub fn to_toml(&self) -> String {
+        let body = toml::to_string_pretty(self).unwrap_or_default();
+        format!(
+            "# μ(I) law fitted by colluvium calibrate. SI units.\n\
+             # μ = |τ|/p with p = trace/3; [mu_zz] holds the fit for |τ|/σ_zz instead.\n\
+             # Outside valid_i (inertial numbers) the law was not measured.\n{body}"
+        )
+    }
+
+    /// The keys of a scene's `rheology` table.
+    fn scene_keys(&self, source: &str) -> Table {
+        let mut keys = Table::new();
+        let mut put = |key: &str, value: Value| keys.insert(key.to_owned(), value);
+        put("mu_s", Value::Float(self.mu_s));
+        put("mu_2", Value::Float(self.mu_2));
+        put("i_0", Value::Float(self.i_0));
+        put("diameter", Value::Float(self.diameter));
+        put("solid_fraction", Value::Float(self.solid_fraction));
+        if let Some(density) = self.grain_density {
+            put("grain_density", Value::Float(density));
+        }
+        if let Some(range) = self.valid_i {
+            put("valid_i", Value::Array(range.map(Value::Float).to_vec()));
+        }
+        put("source", Value::String(source.to_owned()));
+        keys
+    }
+}
+
+/// Puts the numbers of the file in the place of `rheology.file`.
+///
+/// The resolved scene then stands alone: it can be run again when the file has gone.
+pub fn resolve(table: &mut Table) -> Result<(), SceneError> {
+    let Some(Value::Table(rheology)) = table.get_mut("rheology") else {
+        return Ok(());
+    };
+    if let Some(Value::String(path)) = rheology.remove("file") {
+        let law = RheologyFile::read(Path::new(&path))?;
+        rheology.extend(law.scene_keys(&path));
+    }
+    Ok(())
+}

@@ -1,0 +1,251 @@
+//! A continuum layer on an incline: from the scene to the steady flow.
+
+use super::{Findings, Under};
+use crate::cost::Cost;
+use crate::failure::Failure;
+use crate::interruption;
+use crate::progress::Bar;
+use crate::scene::{BagnoldScene, SolverMethod};
+use crate::state_hash;
+use crate::summary::{Model, Quantity, Summary};
+use crate::table::Table;
+use colluvium_continuum::bagnold::{BagnoldCase, BagnoldSolution};
+use colluvium_continuum::flow::{Marching, YieldMethod};
+use colluvium_continuum::layer::{Options, Progress};
+use colluvium_continuum::rheology::MuI;
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+/// What a continuum layer leaves out.
+pub const LEFT_OUT: [&str; 6] = [
+    "grains",
+    "air",
+    "dilatancy (constant solid fraction)",
+    "a moving surface (the depth is constant in steady flow)",
+    "advection of momentum (zero in a flow along the plane)",
+    "non-local effects near the base",
+];
+
+/// The case that a scene describes.
+pub fn case(scene: &BagnoldScene) -> BagnoldCase {
+    let r = &scene.rheology;
+    BagnoldCase {
+        slope: scene.slope_degrees.to_radians(),
+        depth: scene.depth,
+        gravity: scene.gravity,
+        rheology: MuI {
+            mu_s: r.mu_s,
+            mu_2: r.mu_2,
+            i_0: r.i_0,
+            diameter: r.diameter,
+            solid_fraction: r.solid_fraction,
+            grain_density: r.grain_density,
+            cohesion: r.cohesion,
+        },
+        cells: scene.cells(),
+        columns: (scene.grid.columns > 1).then_some(scene.grid.columns as usize),
+    }
+}
+
+/// The solver's settings that a scene describes.
+pub fn options(scene: &BagnoldScene) -> Options {
+    Options {
+        marching: Marching {
+            time_step: scene.solver.timestep_scaled,
+            growth: scene.solver.growth,
+            max_steps: scene.solver.steps as usize,
+            steady_acceleration: scene.solver.steady_tolerance,
+            ..Marching::default()
+        },
+        method: match scene.solver.method {
+            SolverMethod::PrimalDual => YieldMethod::default(),
+            SolverMethod::Regularised => YieldMethod::Regularised(Default::default()),
+        },
+        ..Options::default()
+    }
+}
+
+/// Computes the flow; also gives the wall time [s].
+pub fn solve(
+    scene: &BagnoldScene,
+    progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+) -> Result<(BagnoldSolution, f64), colluvium_continuum::Error> {
+    let start = Instant::now();
+    let solution = case(scene).solve(&options(scene), progress)?;
+    Ok((solution, start.elapsed().as_secs_f64()))
+}
+
+/// What an error of the continuum means for the process.
+pub fn failure(error: colluvium_continuum::Error) -> Failure {
+    match error {
+        colluvium_continuum::Error::OutOfRange { .. } => Failure::Input(error.to_string()),
+        error => Failure::Run(error.to_string()),
+    }
+}
+
+pub(super) fn run(scene: &BagnoldScene, under: &mut Under) -> Result<Findings, Failure> {
+    let bar = Bar::new("bagnold");
+    let mut farthest = 1.0_f64;
+    let solved = solve(scene, &mut |progress: Progress| {
+        // Convergence is about geometric, so the logarithm of the distance runs evenly.
+        farthest = farthest.max(progress.distance_to_steady);
+        let left = progress.distance_to_steady.max(1.0).ln() / farthest.ln().max(1e-9);
+        bar.set(1.0 - left);
+        bar.say(&format!(
+            "step {}, {:.3} m/s",
+            progress.step, progress.mean_velocity
+        ));
+        if interruption::requested() {
+            ControlFlow::Break(())
+        } else {
+            ControlFlow::Continue(())
+        }
+    });
+    bar.clear();
+    let (solution, wall_s) = match solved {
+        Err(colluvium_continuum::Error::Stopped { .. }) => return Err(under.interrupted()),
+        other => other.map_err(failure)?,
+    };
+    under.directory.journal.note(&format!(
+        "steady after {} steps, {} linear solves, {wall_s:.3} s",
+        solution.steps, solution.linear_solves
+    ));
+    let mut summary = Summary::begun("bagnold", "run");
+    describe(&mut summary, scene, &solution, wall_s);
+    // One thread computes the layer, however many the pool has.
+    summary.cost.threads = 1;
+    Ok(Findings {
+        summary,
+        tables: tables(&solution),
+        grains: None,
+    })
+}
+
+/// Velocity and pressure profile and the history of the march.
+pub fn tables(solution: &BagnoldSolution) -> Vec<Table> {
+    let history = &solution.history;
+    vec![
+        Table::new("profile")
+            .with("z", "m", solution.z.clone())
+            .with("u", "m/s", solution.u.clone())
+            .with("p", "Pa", solution.p.clone())
+            .with("u_exact", "m/s", solution.exact_u.clone())
+            .with("p_exact", "Pa", solution.exact_p.clone()),
+        Table::new("history")
+            .with("t", "s", history.iter().map(|r| r.time).collect())
+            .with("dt", "s", history.iter().map(|r| r.dt).collect())
+            .with(
+                "mean_velocity",
+                "m/s",
+                history.iter().map(|r| r.mean_velocity).collect(),
+            )
+            .with(
+                "acceleration",
+                "m/s²",
+                history.iter().map(|r| r.acceleration).collect(),
+            )
+            .with(
+                "linear_solves",
+                "1",
+                history.iter().map(|r| r.linear_solves as f64).collect(),
+            ),
+    ]
+}
+
+/// Fills a summary from a solution.
+pub fn describe(
+    summary: &mut Summary,
+    scene: &BagnoldScene,
+    solution: &BagnoldSolution,
+    wall_s: f64,
+) {
+    let case = case(scene);
+    let cells = solution.cells as u64;
+    summary.model = Model {
+        grains: 0,
+        cells,
+        dt_s: solution.history.last().map_or(0.0, |r| r.dt),
+        dt_limit: "none: the step is implicit; it starts at solver.timestep_scaled and grows"
+            .into(),
+        left_out: LEFT_OUT.map(String::from).to_vec(),
+    };
+    summary.cost = Cost::measured(wall_s, 1, 0, cells * solution.steps as u64);
+    let weight = case.exact_shear_stress(0.0);
+    if weight > 0.0 {
+        summary.ledger.momentum_relative =
+            Some((solution.boundary_shear_stress[0] - weight).abs() / weight);
+    }
+    summary.state_hash = state_hash::of(&[&solution.u, &solution.p]);
+    let exact = "exact Bagnold profile";
+    let rests = case.slope.tan() <= case.rheology.mu_s;
+    let error_unit = if rests { "m/s" } else { "1" };
+    summary.put(
+        "velocity_error_l2",
+        Quantity::new(solution.velocity_error_l2_relative, error_unit).against(0.0, exact),
+    );
+    summary.put(
+        "velocity_error_max",
+        Quantity::new(solution.velocity_error_max_relative, error_unit).against(0.0, exact),
+    );
+    summary.put(
+        "pressure_error_l2",
+        Quantity::new(solution.pressure_error_l2_relative, "1").against(0.0, exact),
+    );
+    let surface = solution.u.last().copied().unwrap_or(0.0);
+    let exact_surface = solution.exact_u.last().copied().unwrap_or(0.0);
+    summary.put(
+        "velocity_top_cell",
+        Quantity::new(surface, "m/s").against(exact_surface, exact),
+    );
+    summary.put(
+        "base_shear_stress",
+        Quantity::new(solution.boundary_shear_stress[0], "Pa")
+            .against(weight, "weight along the plane"),
+    );
+    summary.put(
+        "yielded_fraction",
+        Quantity::new(solution.yielded_fraction, "1"),
+    );
+    summary.put(
+        "ill_posed_fraction",
+        Quantity::new(solution.ill_posed_fraction, "1")
+            .from("volume where C(I) > 0, of the yielded volume"),
+    );
+    summary.put("steps", Quantity::new(solution.steps as f64, "1"));
+    summary.put(
+        "linear_solves",
+        Quantity::new(solution.linear_solves as f64, "1"),
+    );
+    if !rests {
+        let inertial_number = case.rheology.inertial_number_at(case.slope.tan());
+        summary.put(
+            "inertial_number",
+            Quantity::new(inertial_number, "1").from("where μ(I) is the slope's tangent"),
+        );
+        summary
+            .remarks
+            .extend(validity_remark(scene, inertial_number));
+    } else {
+        summary
+            .remarks
+            .push("The slope lies below atan(μ_s): the layer rests.".into());
+    }
+    if solution.ill_posed_fraction > 0.0 {
+        summary.remarks.push(format!(
+            "Ill posed: in {:.0} % of the yielded volume μ(I) lies where short waves grow without bound in two or three dimensions (Barker et al. 2015).",
+            100.0 * solution.ill_posed_fraction
+        ));
+    }
+}
+
+/// Says so when the flow lies outside what the rheology was measured for.
+pub fn validity_remark(scene: &BagnoldScene, inertial_number: f64) -> Option<String> {
+    let range = scene.rheology.valid_i.as_deref()?;
+    let [low, high] = range else { return None };
+    (inertial_number < *low || inertial_number > *high).then(|| {
+        format!(
+            "Outside the calibration: I = {inertial_number:.4} at {} degrees, but the rheology was measured for I in [{low:.4}, {high:.4}].",
+            scene.slope_degrees
+        )
+    })
+}

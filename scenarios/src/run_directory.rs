@@ -1,0 +1,247 @@
+//! The directory of a run: where it lies, what may be overwritten, how files are put in place.
+
+use crate::failure::Failure;
+use crate::journal::Journal;
+use crate::scene::Scene;
+use crate::summary::Summary;
+use crate::table::Table;
+use std::fs;
+use std::io::Write;
+use std::path::{Path, PathBuf};
+
+/// Name of the resolved scene in a run directory; its presence marks the directory as a run.
+pub const SCENE: &str = "scene.toml";
+/// Name of the summary.
+pub const SUMMARY: &str = "summary.json";
+/// Name of the report.
+pub const REPORT: &str = "report.html";
+/// Name of the results.
+pub const RESULTS: &str = "results.h5";
+/// Name of the checkpoint.
+pub const CHECKPOINT: &str = "checkpoint.h5";
+/// Name of the log.
+pub const LOG: &str = "log.txt";
+
+/// Every file that a run, a campaign or a comparison writes.
+const OWN_FILES: [&str; 19] = [
+    SCENE,
+    SUMMARY,
+    REPORT,
+    RESULTS,
+    CHECKPOINT,
+    LOG,
+    "profile.csv",
+    "energy.csv",
+    "trajectory.csv",
+    "history.csv",
+    "points.csv",
+    "stress.csv",
+    "angles.csv",
+    "estimators.csv",
+    "continuum.csv",
+    "pareto.csv",
+    "rheology.toml",
+    "campaign.json",
+    "angles.json",
+];
+
+/// A run directory that has been created.
+#[derive(Debug)]
+pub struct RunDirectory {
+    path: PathBuf,
+    /// The outermost folder that was made for this run, for [`RunDirectory::abandon`].
+    made: Option<PathBuf>,
+    /// The log.
+    pub journal: Journal,
+}
+
+/// Where a run will be written: `--out`, or the first free `results/<scene>-<n>`.
+pub fn place(out: Option<&Path>, scene: &str) -> PathBuf {
+    match out {
+        Some(path) => path.to_owned(),
+        None => (1..)
+            .map(|n| Path::new("results").join(format!("{scene}-{n}")))
+            .find(|path| !path.exists())
+            .unwrap_or_else(|| PathBuf::from("results")),
+    }
+}
+
+/// Whether a directory was written by this program.
+pub fn is_run(path: &Path) -> bool {
+    let text = fs::read_to_string(path.join(SCENE)).unwrap_or_default();
+    text.lines().any(|line| line.starts_with("scene = "))
+}
+
+impl RunDirectory {
+    /// Makes the directory and puts the resolved scene and the log in it.
+    ///
+    /// A run of ours that stands there is replaced; any other folder with files in it is refused.
+    pub fn create(path: &Path, scene: &Scene) -> Result<RunDirectory, Failure> {
+        refuse_foreign(path)?;
+        let made = outermost_missing(path);
+        let unwritable = |error: std::io::Error| {
+            if let Some(made) = &made {
+                // Only folders that this call made, and only while they are empty of others' files.
+                let _ = fs::remove_dir_all(made);
+            }
+            Failure::Input(format!(
+                "--out {}: cannot write there: {error}; allowed: a folder that can be written",
+                path.display()
+            ))
+        };
+        fs::create_dir_all(path).map_err(unwritable)?;
+        if is_run(path) {
+            remove_old_run(path).map_err(unwritable)?;
+        }
+        write_in_place(&path.join(SCENE), scene.to_toml().as_bytes()).map_err(unwritable)?;
+        let journal = Journal::open(&path.join(LOG), false).map_err(unwritable)?;
+        Ok(RunDirectory {
+            path: path.to_owned(),
+            made,
+            journal,
+        })
+    }
+
+    /// Opens the directory of a run that is to go on; its scene has to be the same.
+    pub fn reopen(path: &Path, scene: &Scene) -> Result<RunDirectory, Failure> {
+        let shown = path.display();
+        let text = fs::read_to_string(path.join(SCENE)).map_err(|error| {
+            Failure::Input(format!(
+                "--resume: {shown} holds no run to go on with: {SCENE}: {error}; allowed: --out with the directory of an interrupted run"
+            ))
+        })?;
+        let old = Scene::from_text(&text, &path.join(SCENE).display().to_string())?;
+        if old != *scene {
+            let keys = differing_keys(&old.resolved, &scene.resolved, "");
+            return Err(Failure::Input(format!(
+                "--resume: {shown} holds a run of another scene; differing: {}; give the same scene and settings",
+                keys.join(", ")
+            )));
+        }
+        let journal = Journal::open(&path.join(LOG), true).map_err(|error| {
+            Failure::Input(format!("--out {shown}: cannot write there: {error}"))
+        })?;
+        journal.note("resumed");
+        Ok(RunDirectory {
+            path: path.to_owned(),
+            made: None,
+            journal,
+        })
+    }
+
+    /// Takes back a directory that was made for input that turned out to be bad.
+    pub fn abandon(self) {
+        if let Some(made) = self.made {
+            let _ = fs::remove_dir_all(made);
+        }
+    }
+
+    /// The path.
+    pub fn path(&self) -> &Path {
+        &self.path
+    }
+
+    /// The path of a file in it.
+    pub fn file(&self, name: &str) -> PathBuf {
+        self.path.join(name)
+    }
+
+    /// Writes a file whole: readers see the old one or the new one, never a part.
+    pub fn write(&self, name: &str, content: &[u8]) -> Result<(), Failure> {
+        let path = self.file(name);
+        write_in_place(&path, content)
+            .map_err(|error| Failure::Run(format!("cannot write {}: {error}", path.display())))
+    }
+
+    /// Writes a table as CSV.
+    pub fn write_table(&self, table: &Table) -> Result<(), Failure> {
+        self.write(&format!("{}.csv", table.name), table.to_csv().as_bytes())
+    }
+
+    /// Writes the summary.
+    pub fn write_summary(&self, summary: &Summary) -> Result<(), Failure> {
+        let text = serde_json::to_string_pretty(summary)
+            .map_err(|error| Failure::Run(format!("summary: {error}")))?;
+        self.write(SUMMARY, format!("{text}\n").as_bytes())
+    }
+}
+
+/// Writes under a temporary name in the same folder, flushes and renames.
+pub fn write_in_place(path: &Path, content: &[u8]) -> std::io::Result<()> {
+    let mut name = path.file_name().unwrap_or_default().to_owned();
+    name.push(".partial");
+    let partial = path.with_file_name(name);
+    let written = fs::File::create(&partial).and_then(|mut file| {
+        file.write_all(content)?;
+        file.sync_all()
+    });
+    match written.and_then(|()| fs::rename(&partial, path)) {
+        Ok(()) => Ok(()),
+        Err(error) => {
+            let _ = fs::remove_file(&partial);
+            Err(error)
+        }
+    }
+}
+
+fn refuse_foreign(path: &Path) -> Result<(), Failure> {
+    let shown = path.display();
+    if path.exists() && !path.is_dir() {
+        return Err(Failure::Input(format!(
+            "--out {shown}: is a file; allowed: a new, an empty or an earlier run's directory"
+        )));
+    }
+    let occupied = fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_some());
+    if occupied && !is_run(path) {
+        return Err(Failure::Input(format!(
+            "--out {shown}: is not empty and not a run directory; allowed: a new, an empty or an earlier run's directory"
+        )));
+    }
+    Ok(())
+}
+
+fn outermost_missing(path: &Path) -> Option<PathBuf> {
+    path.ancestors()
+        .take_while(|p| !p.as_os_str().is_empty() && !p.exists())
+        .last()
+        .map(Path::to_owned)
+}
+
+/// Removes what an earlier run wrote, so that old tables do not pass for new ones. Files of other
+/// names stay.
+fn remove_old_run(path: &Path) -> std::io::Result<()> {
+    let profiles: Vec<String> = fs::read_dir(path)?
+        .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+        .filter(|name| name.starts_with("profile_") && name.ends_with(".csv"))
+        .collect();
+    for name in OWN_FILES
+        .into_iter()
+        .chain(profiles.iter().map(String::as_str))
+    {
+        match fs::remove_file(path.join(name)) {
+            Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
+            _ => {}
+        }
+    }
+    Ok(())
+}
+
+fn differing_keys(a: &toml::Table, b: &toml::Table, path: &str) -> Vec<String> {
+    let names: std::collections::BTreeSet<&String> = a.keys().chain(b.keys()).collect();
+    let mut keys = Vec::new();
+    for name in names {
+        let dotted = if path.is_empty() {
+            name.clone()
+        } else {
+            format!("{path}.{name}")
+        };
+        match (a.get(name), b.get(name)) {
+            (Some(toml::Value::Table(x)), Some(toml::Value::Table(y))) => {
+                keys.extend(differing_keys(x, y, &dotted));
+            }
+            (x, y) if x != y => keys.push(dotted),
+            _ => {}
+        }
+    }
+    keys
+}

@@ -1,0 +1,357 @@
+//! Scenes: what is to be simulated, as TOML.
+//!
+//! A scene file names its kind with `scene = "bagnold"`; keys it leaves out take the value of the
+//! bundled scene of that kind, so every default has one home: the bundled file. The same schema
+//! that `colluvium schema` prints is what input is checked against.
+
+mod bagnold;
+mod check;
+mod error;
+mod impact;
+mod incline;
+mod layers;
+
+pub use bagnold::{BagnoldGrid, BagnoldScene, RheologyKeys, SolverKeys, SolverMethod};
+pub use error::SceneError;
+pub use impact::{ImpactScene, RollingKeys};
+pub use incline::{
+    Bracket, CalibrationKeys, ContactKeys, FloorKeys, GrainKeys, GuessKeys, InclineScene,
+    InclineStart, SizeLaw, TimeKeys, TimestepKeys,
+};
+
+use crate::rheology_file;
+use serde_json::{Value, json};
+use std::path::{Path, PathBuf};
+
+/// The names and texts of the bundled scenes.
+pub const BUNDLED: [(&str, &str); 6] = [
+    (
+        "incline-moderate",
+        include_str!("../scenes/incline-moderate.toml"),
+    ),
+    (
+        "incline-gravel",
+        include_str!("../scenes/incline-gravel.toml"),
+    ),
+    (
+        "incline-glass",
+        include_str!("../scenes/incline-glass.toml"),
+    ),
+    ("bagnold", include_str!("../scenes/bagnold.toml")),
+    ("two-spheres", include_str!("../scenes/two-spheres.toml")),
+    (
+        "sphere-on-plane",
+        include_str!("../scenes/sphere-on-plane.toml"),
+    ),
+];
+
+/// The text of a bundled scene.
+pub fn bundled(name: &str) -> Option<&'static str> {
+    BUNDLED
+        .iter()
+        .find(|(n, _)| *n == name)
+        .map(|(_, text)| *text)
+}
+
+/// The part of a scene that its kind decides.
+#[derive(Clone, Debug, PartialEq)]
+pub enum SceneBody {
+    /// Grains on a rough inclined plane.
+    Incline(Box<InclineScene>),
+    /// The μ(I) continuum on an incline.
+    Bagnold(Box<BagnoldScene>),
+    /// One impact of two spheres, or of a sphere on a plane.
+    Impact(Box<ImpactScene>),
+}
+
+impl SceneBody {
+    /// Every key as it was read, so that `31` and `31.0` are the same scene.
+    fn to_table(&self) -> toml::Table {
+        match self {
+            SceneBody::Incline(scene) => toml::Table::try_from(scene),
+            SceneBody::Bagnold(scene) => toml::Table::try_from(scene),
+            SceneBody::Impact(scene) => toml::Table::try_from(scene),
+        }
+        .unwrap_or_default()
+    }
+}
+
+/// A checked scene.
+#[derive(Clone, Debug, PartialEq)]
+pub struct Scene {
+    /// The kind, which is also the name of the bundled scene it builds on.
+    pub name: String,
+    /// What its kind decides.
+    pub body: SceneBody,
+    /// Every key with the value that will be used.
+    pub resolved: toml::Table,
+}
+
+impl Scene {
+    /// Reads a bundled scene or a scene file and applies `KEY=VALUE` settings.
+    pub fn load(name_or_path: &str, settings: &[String]) -> Result<Scene, SceneError> {
+        let (own, origin, folder) = match bundled(name_or_path) {
+            Some(text) => (
+                layers::parse(text, name_or_path)?,
+                name_or_path.to_owned(),
+                None,
+            ),
+            None => {
+                let path = Path::new(name_or_path);
+                let text = read(path)?;
+                let origin = path.display().to_string();
+                (
+                    layers::parse(&text, &origin)?,
+                    origin,
+                    path.parent().map(PathBuf::from),
+                )
+            }
+        };
+        Scene::from_layers(own, &origin, folder.as_deref(), settings)
+    }
+
+    /// Reads the resolved scene of a run directory.
+    pub fn from_text(text: &str, origin: &str) -> Result<Scene, SceneError> {
+        Scene::from_layers(layers::parse(text, origin)?, origin, None, &[])
+    }
+
+    fn from_layers(
+        mut own: toml::Table,
+        origin: &str,
+        folder: Option<&Path>,
+        settings: &[String],
+    ) -> Result<Scene, SceneError> {
+        let name = kind_of(&mut own, origin)?;
+        let text = bundled(&name).unwrap_or_default();
+        let mut base = layers::parse(text, &name)?;
+        base.remove("scene");
+        let schema = body_schema(&name);
+
+        let choices = alternatives(&name);
+        // A rheology file is replaced by its numbers before layers are laid over each other, so
+        // only the stiffness keys have defaults to drop.
+        let drops = if matches!(family(&name), Family::Incline) {
+            choices
+        } else {
+            &[]
+        };
+        check::check(&own, &schema, origin)?;
+        layers::check_choices(&own, choices, origin)?;
+        if let Some(folder) = folder {
+            layers::anchor_path(&mut own, &["rheology", "file"], folder);
+        }
+        rheology_file::resolve(&mut own)?;
+        let mut set = layers::parse_settings(settings)?;
+        check::check(&set, &schema, "--set")?;
+        layers::check_choices(&set, choices, "--set")?;
+        rheology_file::resolve(&mut set)?;
+        let table = layers::merge(layers::merge(base, own, drops), set, drops);
+        check::require(&table, &schema, origin)?;
+
+        let body = body(&name, &table).map_err(|message| SceneError::Unreadable {
+            file: origin.to_owned(),
+            message,
+        })?;
+        let mut resolved = toml::Table::new();
+        resolved.insert("scene".into(), toml::Value::String(name.clone()));
+        resolved.extend(body.to_table());
+        let scene = Scene {
+            name,
+            body,
+            resolved,
+        };
+        scene.check_together(origin)?;
+        Ok(scene)
+    }
+
+    /// The scene with other settings on top.
+    pub fn with(&self, settings: &[String]) -> Result<Scene, SceneError> {
+        Scene::from_layers(self.resolved.clone(), &self.name, None, settings)
+    }
+
+    /// The resolved scene as TOML.
+    pub fn to_toml(&self) -> String {
+        let body = toml::to_string_pretty(&self.resolved).unwrap_or_default();
+        format!("# Resolved scene: every key with the value that was used. SI units.\n{body}")
+    }
+
+    /// Limits that involve more than one key.
+    fn check_together(&self, origin: &str) -> Result<(), SceneError> {
+        match &self.body {
+            SceneBody::Incline(scene) => scene.check_together(origin),
+            SceneBody::Bagnold(scene) => scene.check_together(origin),
+            SceneBody::Impact(scene) => scene.check_together(origin),
+        }
+    }
+}
+
+fn read(path: &Path) -> Result<String, SceneError> {
+    std::fs::read_to_string(path).map_err(|source| {
+        let name = path.display().to_string();
+        let names = BUNDLED.map(|(n, _)| n);
+        SceneError::Missing {
+            nearest: check::nearest(&name, names.iter().copied()),
+            names: names.join(", "),
+            name,
+            source,
+        }
+    })
+}
+
+/// Takes the key `scene` out of a table.
+fn kind_of(table: &mut toml::Table, origin: &str) -> Result<String, SceneError> {
+    let names = BUNDLED.map(|(n, _)| n);
+    match table.remove("scene") {
+        Some(toml::Value::String(kind)) if bundled(&kind).is_some() => Ok(kind),
+        Some(value) => Err(SceneError::OutOfRange {
+            file: origin.to_owned(),
+            key: "scene".into(),
+            value: value.to_string(),
+            range: format!("one of {}", names.join(", ")),
+        }),
+        None => Err(SceneError::MissingKey {
+            file: origin.to_owned(),
+            key: "scene".into(),
+            wanted: format!("one of {}", names.join(", ")),
+        }),
+    }
+}
+
+fn body(name: &str, table: &toml::Table) -> Result<SceneBody, String> {
+    let table = table.clone();
+    Ok(match family(name) {
+        Family::Incline => SceneBody::Incline(table.try_into().map_err(plain)?),
+        Family::Bagnold => SceneBody::Bagnold(table.try_into().map_err(plain)?),
+        Family::Impact => SceneBody::Impact(table.try_into().map_err(plain)?),
+    })
+}
+
+fn plain(error: toml::de::Error) -> String {
+    error.message().to_owned()
+}
+
+enum Family {
+    Incline,
+    Bagnold,
+    Impact,
+}
+
+fn family(name: &str) -> Family {
+    match name {
+        "bagnold" => Family::Bagnold,
+        "two-spheres" | "sphere-on-plane" => Family::Impact,
+        _ => Family::Incline,
+    }
+}
+
+/// Keys of which exactly one may be given: naming one drops the others' defaults.
+fn alternatives(name: &str) -> &'static [&'static [&'static str]] {
+    match family(name) {
+        Family::Incline => &[&[
+            "contact.stiffness_scaled",
+            "contact.stiffness",
+            "contact.stiffness_from_speed",
+        ]],
+        Family::Bagnold => rheology_file::ALTERNATIVES,
+        Family::Impact => &[],
+    }
+}
+
+/// The JSON Schema of one kind, without the key `scene`.
+fn body_schema(name: &str) -> Value {
+    let schema = match family(name) {
+        Family::Incline => schemars::schema_for!(InclineScene),
+        Family::Bagnold => schemars::schema_for!(BagnoldScene),
+        Family::Impact => schemars::schema_for!(ImpactScene),
+    };
+    schema.to_value()
+}
+
+/// The JSON Schema of scene files, for editors.
+///
+/// Only `scene` is required: keys left out take the value of the bundled scene.
+pub fn json_schema() -> Value {
+    let mut kinds = Vec::new();
+    let mut definitions = serde_json::Map::new();
+    for (name, _) in BUNDLED {
+        let mut schema = body_schema(name);
+        if let Some(object) = schema.as_object_mut() {
+            if let Some(Value::Object(inner)) = object.remove("$defs") {
+                for (key, mut definition) in inner {
+                    if let Some(d) = definition.as_object_mut() {
+                        d.remove("required");
+                    }
+                    definitions.insert(key, definition);
+                }
+            }
+            object.remove("$schema");
+            object.insert("title".into(), json!(name));
+            object.insert("required".into(), json!(["scene"]));
+            if let Some(Value::Object(properties)) = object.get_mut("properties") {
+                properties.insert("scene".into(), json!({ "const": name }));
+            }
+        }
+        kinds.push(schema);
+    }
+    json!({
+        "$schema": "https://json-schema.org/draft/2020-12/schema",
+        "title": "Colluvium scene",
+        "description": "SI units. Keys left out take the value of the bundled scene of the same kind.",
+        "oneOf": kinds,
+        "$defs": definitions,
+    })
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn every_bundled_scene_is_complete_and_survives_a_round_trip() {
+        for (name, _) in BUNDLED {
+            let scene = Scene::load(name, &[]).unwrap();
+            assert_eq!(scene.name, name);
+            let again = Scene::from_text(&scene.to_toml(), "resolved").unwrap();
+            assert_eq!(scene, again);
+        }
+    }
+
+    #[test]
+    fn a_setting_reaches_its_key_and_drops_the_alternatives() {
+        let settings = [
+            "slope_degrees=31".to_owned(),
+            "contact.stiffness=5e4".to_owned(),
+        ];
+        let scene = Scene::load("incline-moderate", &settings).unwrap();
+        let SceneBody::Incline(incline) = scene.body else {
+            panic!("wrong kind")
+        };
+        assert_eq!(incline.slope_degrees, 31.0);
+        assert_eq!(incline.contact.stiffness, Some(5e4));
+        assert_eq!(incline.contact.stiffness_scaled, None);
+    }
+
+    #[test]
+    fn mistakes_name_key_value_and_range() {
+        let message = |set: &str| {
+            Scene::load("incline-moderate", &[set.to_owned()])
+                .unwrap_err()
+                .to_string()
+        };
+        let m = message("slope_degrees=95");
+        assert!(
+            m.contains("slope_degrees") && m.contains("95") && m.contains("90"),
+            "{m}"
+        );
+        let m = message("contact.fricton=0.3");
+        assert!(
+            m.contains("contact.fricton") && m.contains("contact.friction"),
+            "{m}"
+        );
+        let m = message("seed=\"one\"");
+        assert!(
+            m.contains("seed") && m.contains("one") && m.contains("integer"),
+            "{m}"
+        );
+    }
+}

@@ -1,0 +1,149 @@
+//! Keys of the continuum on an incline.
+
+use super::SceneError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A layer of μ(I) material on an incline, from rest to steady flow.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BagnoldScene {
+    /// Inclination to the horizontal [degrees].
+    #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 90.0))]
+    pub slope_degrees: f64,
+    /// Depth of the layer, normal to the plane [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e5))]
+    pub depth: f64,
+    /// Gravity [m/s²].
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
+    pub gravity: f64,
+    /// Size of the run: cells across the depth grow with it.
+    #[schemars(extend("minimum" = 0.1, "maximum" = 64.0))]
+    pub scale: f64,
+    /// The material.
+    pub rheology: RheologyKeys,
+    /// The grid.
+    pub grid: BagnoldGrid,
+    /// The solver.
+    pub solver: SolverKeys,
+}
+
+/// A μ(I) material, by numbers or from a file that `calibrate` wrote.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct RheologyKeys {
+    /// A `rheology.toml`; its numbers take the place of the keys below.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+    /// Friction μ_s at I → 0.
+    #[schemars(extend("minimum" = 0.0, "maximum" = 5.0))]
+    pub mu_s: f64,
+    /// Friction μ_2 at I → ∞.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 20.0))]
+    pub mu_2: f64,
+    /// Inertial number I_0 half way between.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
+    pub i_0: f64,
+    /// Grain diameter d [m].
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0))]
+    pub diameter: f64,
+    /// Solid volume fraction φ.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0))]
+    pub solid_fraction: f64,
+    /// Density of the grains ρ_s [kg/m³].
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 30000.0))]
+    pub grain_density: f64,
+    /// Cohesion c [Pa].
+    #[serde(default)]
+    #[schemars(extend("minimum" = 0.0, "maximum" = 1.0e9))]
+    pub cohesion: f64,
+    /// Inertial numbers between which the law was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minItems" = 2, "maxItems" = 2, "items" = {"type": "number", "minimum": 0.0, "maximum": 1.0e4}))]
+    pub valid_i: Option<Vec<f64>>,
+    /// Where the numbers come from.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub source: Option<String>,
+}
+
+/// The grid.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BagnoldGrid {
+    /// Cells across the depth at scale 1.
+    #[schemars(extend("minimum" = 4, "maximum" = 4096))]
+    pub cells: u64,
+    /// Cells downslope; 1 stores no downslope axis.
+    #[schemars(extend("minimum" = 1, "maximum" = 256))]
+    pub columns: u64,
+}
+
+/// The solver.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct SolverKeys {
+    /// How yield is treated.
+    pub method: SolverMethod,
+    /// First time step over √(depth/gravity).
+    #[schemars(extend("minimum" = 1.0e-6, "maximum" = 1.0e10))]
+    pub timestep_scaled: f64,
+    /// Factor by which the time step grows from step to step.
+    #[schemars(extend("minimum" = 1.0, "maximum" = 1.0e6))]
+    pub growth: f64,
+    /// Steady when the largest acceleration over gravity falls below this.
+    #[schemars(extend("minimum" = 1.0e-14, "maximum" = 1.0e-2))]
+    pub steady_tolerance: f64,
+    /// Most time steps.
+    #[schemars(extend("minimum" = 1, "maximum" = 1000000))]
+    pub steps: u64,
+}
+
+/// How yield is treated.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum SolverMethod {
+    /// Newton on velocity, pressure and stress at once.
+    PrimalDual,
+    /// A viscosity of limited size.
+    Regularised,
+}
+
+impl BagnoldScene {
+    /// Cells across the depth at this scale.
+    pub fn cells(&self) -> usize {
+        (self.grid.cells as f64 * self.scale).round().max(4.0) as usize
+    }
+
+    pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {
+        if self.grid.columns == 2 {
+            return Err(SceneError::OutOfRange {
+                file: origin.to_owned(),
+                key: "grid.columns".into(),
+                value: "2".into(),
+                range: "1, or 3 to 256".into(),
+            });
+        }
+        let r = &self.rheology;
+        if r.mu_2 < r.mu_s {
+            return Err(SceneError::OutOfRange {
+                file: origin.to_owned(),
+                key: "rheology.mu_2".into(),
+                value: r.mu_2.to_string(),
+                range: format!("at least rheology.mu_s = {}", r.mu_s),
+            });
+        }
+        let tangent = self.slope_degrees.to_radians().tan();
+        if tangent >= r.mu_2 {
+            return Err(SceneError::OutOfRange {
+                file: origin.to_owned(),
+                key: "slope_degrees".into(),
+                value: self.slope_degrees.to_string(),
+                range: format!(
+                    "[0, {:.4}): above atan(rheology.mu_2) the flow accelerates for ever and has no steady state",
+                    r.mu_2.atan().to_degrees()
+                ),
+            });
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,247 @@
+//! Checks a TOML table against the JSON Schema of its scene: names, types and ranges.
+//!
+//! The schema comes from the scene's own structs, so what `colluvium schema` prints, what is
+//! checked and what is read cannot drift apart.
+
+use super::SceneError;
+use serde_json::Value;
+
+/// Names and values of all keys that are there; says nothing about keys left out.
+pub fn check(table: &toml::Table, schema: &Value, file: &str) -> Result<(), SceneError> {
+    Checker { root: schema, file }.table(table, schema, "")
+}
+
+/// Every required key is there.
+pub fn require(table: &toml::Table, schema: &Value, file: &str) -> Result<(), SceneError> {
+    Checker { root: schema, file }.required(table, schema, "")
+}
+
+/// The name nearest to `name`, if one is near enough to be a slip.
+pub fn nearest<'a>(name: &str, known: impl Iterator<Item = &'a str>) -> Option<String> {
+    known
+        .map(|k| (strsim::jaro_winkler(name, k), k))
+        .filter(|(score, _)| *score > 0.75)
+        .max_by(|a, b| a.0.total_cmp(&b.0))
+        .map(|(_, k)| k.to_owned())
+}
+
+struct Checker<'a> {
+    root: &'a Value,
+    file: &'a str,
+}
+
+impl Checker<'_> {
+    /// Follows `$ref` and the one alternative of an optional value that is not null.
+    fn definition<'s>(&'s self, schema: &'s Value) -> &'s Value {
+        if let Some(Value::String(path)) = schema.get("$ref") {
+            let pointer = path.trim_start_matches('#');
+            return self
+                .root
+                .pointer(pointer)
+                .map_or(schema, |s| self.definition(s));
+        }
+        if let Some(Value::Array(options)) = schema.get("anyOf")
+            && let Some(option) = options.iter().find(|o| o["type"] != "null")
+        {
+            return self.definition(option);
+        }
+        schema
+    }
+
+    fn table(&self, table: &toml::Table, schema: &Value, path: &str) -> Result<(), SceneError> {
+        let empty = serde_json::Map::new();
+        let properties = schema["properties"].as_object().unwrap_or(&empty);
+        for (key, value) in table {
+            let dotted = join(path, key);
+            let Some(property) = properties.get(key) else {
+                return Err(SceneError::UnknownKey {
+                    file: self.file.to_owned(),
+                    nearest: nearest(key, properties.keys().map(String::as_str))
+                        .map(|n| join(path, &n)),
+                    known: properties.keys().cloned().collect::<Vec<_>>().join(", "),
+                    key: dotted,
+                });
+            };
+            self.value(value, property, &dotted)?;
+        }
+        Ok(())
+    }
+
+    fn required(&self, table: &toml::Table, schema: &Value, path: &str) -> Result<(), SceneError> {
+        for key in schema["required"]
+            .as_array()
+            .into_iter()
+            .flatten()
+            .filter_map(Value::as_str)
+        {
+            if !table.contains_key(key) {
+                return Err(SceneError::MissingKey {
+                    file: self.file.to_owned(),
+                    key: join(path, key),
+                    wanted: describe(self.definition(&schema["properties"][key])),
+                });
+            }
+        }
+        for (key, value) in table {
+            if let toml::Value::Table(inner) = value {
+                let definition = self.definition(&schema["properties"][key]);
+                self.required(inner, definition, &join(path, key))?;
+            }
+        }
+        Ok(())
+    }
+
+    fn value(&self, value: &toml::Value, property: &Value, key: &str) -> Result<(), SceneError> {
+        let schema = self.definition(property);
+        if let toml::Value::Table(inner) = value
+            && kind(schema) == "object"
+        {
+            return self.table(inner, schema, key);
+        }
+        if let toml::Value::Array(items) = value
+            && kind(schema) == "array"
+        {
+            return self.array(value, items, schema, key);
+        }
+        let wrong_type = || SceneError::WrongType {
+            file: self.file.to_owned(),
+            key: key.to_owned(),
+            value: value.to_string(),
+            found: value.type_str().to_owned(),
+            wanted: describe(schema),
+        };
+        let number = match (kind(schema), value) {
+            ("number", toml::Value::Float(x)) => *x,
+            ("number" | "integer", toml::Value::Integer(n)) => *n as f64,
+            ("string", toml::Value::String(text)) => {
+                return if words(schema).is_empty() || words(schema).contains(&text.as_str()) {
+                    Ok(())
+                } else {
+                    Err(self.out_of_range(value, schema, key))
+                };
+            }
+            ("boolean", toml::Value::Boolean(_)) => return Ok(()),
+            _ => return Err(wrong_type()),
+        };
+        if inside(number, schema) {
+            Ok(())
+        } else {
+            Err(self.out_of_range(value, schema, key))
+        }
+    }
+
+    fn array(
+        &self,
+        value: &toml::Value,
+        items: &[toml::Value],
+        schema: &Value,
+        key: &str,
+    ) -> Result<(), SceneError> {
+        let count = items.len() as u64;
+        let least = schema["minItems"].as_u64().unwrap_or(0);
+        let most = schema["maxItems"].as_u64().unwrap_or(u64::MAX);
+        if count < least || count > most {
+            return Err(self.out_of_range(value, schema, key));
+        }
+        for (n, item) in items.iter().enumerate() {
+            self.value(item, &schema["items"], &format!("{key}[{n}]"))?;
+        }
+        Ok(())
+    }
+
+    fn out_of_range(&self, value: &toml::Value, schema: &Value, key: &str) -> SceneError {
+        SceneError::OutOfRange {
+            file: self.file.to_owned(),
+            key: key.to_owned(),
+            value: value.to_string(),
+            range: describe(schema),
+        }
+    }
+}
+
+fn join(path: &str, key: &str) -> String {
+    if path.is_empty() {
+        key.to_owned()
+    } else {
+        format!("{path}.{key}")
+    }
+}
+
+/// The schema's type, leaving out the null of an optional key.
+fn kind(schema: &Value) -> &str {
+    match &schema["type"] {
+        Value::String(kind) => kind,
+        Value::Array(kinds) => kinds
+            .iter()
+            .filter_map(Value::as_str)
+            .find(|k| *k != "null")
+            .unwrap_or(""),
+        // An enumeration with a comment on each word has no type of its own.
+        _ if schema.get("oneOf").is_some() || schema.get("enum").is_some() => "string",
+        _ => "",
+    }
+}
+
+/// The words of an enumeration, however the schema spells it.
+fn words(schema: &Value) -> Vec<&str> {
+    let mut words: Vec<&str> = schema["enum"]
+        .as_array()
+        .into_iter()
+        .flatten()
+        .filter_map(Value::as_str)
+        .collect();
+    for option in schema["oneOf"].as_array().into_iter().flatten() {
+        words.extend(option["const"].as_str());
+        words.extend(
+            option["enum"]
+                .as_array()
+                .into_iter()
+                .flatten()
+                .filter_map(Value::as_str),
+        );
+    }
+    words
+}
+
+fn inside(x: f64, schema: &Value) -> bool {
+    let limit = |name: &str| schema[name].as_f64();
+    x.is_finite()
+        && limit("minimum").is_none_or(|l| x >= l)
+        && limit("exclusiveMinimum").is_none_or(|l| x > l)
+        && limit("maximum").is_none_or(|l| x <= l)
+        && limit("exclusiveMaximum").is_none_or(|l| x < l)
+}
+
+/// Type and range in words, as in "number in (0, 1]".
+fn describe(schema: &Value) -> String {
+    let limit = |name: &str| schema[name].as_f64();
+    let name = match kind(schema) {
+        "string" if !words(schema).is_empty() => {
+            return format!("one of {}", words(schema).join(", "));
+        }
+        "array" => {
+            let (least, most) = (schema["minItems"].as_u64(), schema["maxItems"].as_u64());
+            return match (least, most) {
+                (Some(a), Some(b)) if a == b => format!("array of {a} values"),
+                (Some(a), Some(b)) => format!("array of {a} to {b} values"),
+                _ => "array".to_owned(),
+            };
+        }
+        "object" => return "table".to_owned(),
+        name => name,
+    };
+    let low = limit("minimum")
+        .map(|l| format!("[{l}"))
+        .or_else(|| limit("exclusiveMinimum").map(|l| format!("({l}")));
+    let high = limit("maximum")
+        .map(|l| format!("{l}]"))
+        .or_else(|| limit("exclusiveMaximum").map(|l| format!("{l})")));
+    match (low, high) {
+        (None, None) => name.to_owned(),
+        (low, high) => format!(
+            "{name} in {}, {}",
+            low.unwrap_or_else(|| "(-inf".into()),
+            high.unwrap_or_else(|| "inf)".into())
+        ),
+    }
+}
