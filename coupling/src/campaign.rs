@@ -19,14 +19,14 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub enum CampaignEvent<'a> {
     /// A run begins.
     Started {
-        /// Slope [degrees].
+        /// Slope (degrees).
         slope_degrees: f64,
         /// What it is for.
         purpose: Purpose,
     },
     /// A run has come so far.
     Progress {
-        /// Slope [degrees].
+        /// Slope (degrees).
         slope_degrees: f64,
         /// What it is for.
         purpose: Purpose,
@@ -42,9 +42,9 @@ pub enum CampaignEvent<'a> {
 pub struct CampaignResult {
     /// All runs: measured flows by rising slope, then the search for the stop, then for the onset.
     pub runs: Vec<InclineResult>,
-    /// Highest slope where a flow stops and lowest where it goes on [degrees].
+    /// Highest slope where a flow stops and lowest where it goes on (degrees).
     pub stop_bracket_degrees: Option<(f64, f64)>,
-    /// Highest slope where a bed stays at rest and lowest where it starts to flow [degrees].
+    /// Highest slope where a bed stays at rest and lowest where it starts to flow (degrees).
     pub onset_bracket_degrees: Option<(f64, f64)>,
     /// All points that the fits use.
     pub points: Vec<LocalPoint>,

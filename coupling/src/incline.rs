@@ -45,11 +45,11 @@ pub struct InclineRun {
     series: Vec<SeriesPoint>,
     /// Index into `series` where averaging began.
     averaging_from: usize,
-    /// Since when the grains have been still without a break [s]; negative if they are not.
+    /// Since when the grains have been still without a break (s); negative if they are not.
     resting_since: f64,
-    /// `distance` at that time [m].
+    /// `distance` at that time (m).
     distance_at_stop: f64,
-    /// ∫ mean velocity dt [m].
+    /// ∫ mean velocity dt (m).
     distance: f64,
     wall_s: f64,
 }

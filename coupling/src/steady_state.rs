@@ -33,7 +33,7 @@ pub enum Trend {
 pub struct SteadyTest {
     /// The verdict.
     pub trend: Trend,
-    /// Where the start is cut [s].
+    /// Where the start is cut (s).
     pub truncation_time: f64,
     /// Mean after the cut.
     pub mean: f64,
@@ -47,7 +47,7 @@ pub struct SteadyTest {
     pub p_value: f64,
     /// Effective number of independent samples after the cut.
     pub effective_samples: f64,
-    /// Autocorrelation time [s].
+    /// Autocorrelation time (s).
     pub correlation_time: f64,
     /// Drift that still counts as steady.
     pub tolerance: f64,

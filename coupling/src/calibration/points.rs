@@ -6,9 +6,9 @@ use serde::{Deserialize, Serialize};
 /// One layer of one run, with standard errors.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct LocalPoint {
-    /// Slope of the run [degrees].
+    /// Slope of the run (degrees).
     pub slope_degrees: f64,
-    /// Height above the base [m].
+    /// Height above the base (m).
     pub z: f64,
     /// I = γ̇ d √(ρ_s/p).
     pub inertial_number: f64,
@@ -32,9 +32,9 @@ pub struct LocalPoint {
 /// surface, the upper face of the highest layer with φ > `surface_solid_fraction`.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct PointRules {
-    /// Cut above the base [m]; 3 d: the basal layer slips and is layered.
+    /// Cut above the base (m); 3 d: the basal layer slips and is layered.
     pub base_cut: f64,
-    /// Cut below the surface [m]; 2 d: p → 0 and grains saltate.
+    /// Cut below the surface (m); 2 d: p → 0 and grains saltate.
     pub top_cut: f64,
     /// Solid fraction that marks the surface; 0.2 as in the thesis.
     pub surface_solid_fraction: f64,
@@ -51,7 +51,7 @@ impl PointRules {
     }
 }
 
-/// Height of the flow [m]: upper face of the highest layer with φ above the given value; 0 without one.
+/// Height of the flow (m): upper face of the highest layer with φ above the given value; 0 without one.
 pub fn flow_height(profile: &Profile, solid_fraction: f64) -> f64 {
     profile
         .rows

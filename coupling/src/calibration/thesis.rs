@@ -135,13 +135,13 @@ impl Row {
 /// What the estimators need of one steady flow.
 #[derive(Clone, Debug, PartialEq)]
 pub struct VelocityProfile {
-    /// Slope θ [rad].
+    /// Slope θ (rad).
     pub slope: f64,
     /// Gravity [m/s²].
     pub gravity: f64,
-    /// Mean diameter [m].
+    /// Mean diameter (m).
     pub diameter: f64,
-    /// Heights of the layers [m], rising.
+    /// Heights of the layers (m), rising.
     pub z: Vec<f64>,
     /// Mean velocities downslope [m/s].
     pub u: Vec<f64>,
@@ -219,7 +219,8 @@ impl VelocityProfile {
                 .map(|&k| (self.u[k] - i * unit(k)).powi(2))
                 .sum::<f64>()
                 / used.len() as f64;
-            // Few layers near the base always fit well: as there, h below half of h_0 is no flow height.
+            // Our own rule, the thesis states none: a few layers near the base always fit well, so
+            // that h below half of h_0 is not taken for a flow height.
             if h >= 0.5 * h_0 && best.is_none_or(|(least, ..)| residual < least) {
                 best = Some((residual, i, h));
             }

@@ -6,11 +6,11 @@ use serde::{Deserialize, Serialize};
 /// Range of slopes to search and how finely.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Bracket {
-    /// A slope thought to be at rest [degrees].
+    /// A slope thought to be at rest (degrees).
     pub low: f64,
-    /// A slope thought to flow [degrees].
+    /// A slope thought to flow (degrees).
     pub high: f64,
-    /// Width at which the search ends [degrees].
+    /// Width at which the search ends (degrees).
     pub resolution: f64,
 }
 
@@ -47,7 +47,7 @@ pub struct CampaignSpec {
     pub base: InclineSpec,
     /// Material in the thesis' Table 2.6 to compare with: `moderate` or `gravel`.
     pub published_material: Option<String>,
-    /// Slopes of the measured flows [degrees].
+    /// Slopes of the measured flows (degrees).
     pub flow_angles_degrees: Vec<f64>,
     /// Starting velocities of measured flows.
     pub guessed_law: GuessedLaw,
@@ -55,7 +55,7 @@ pub struct CampaignSpec {
     pub stop: Bracket,
     /// Search for the slope where a bed at rest starts.
     pub onset: Bracket,
-    /// Longest run of a search [s].
+    /// Longest run of a search (s).
     pub search_time: f64,
     /// Inertial number at the start of the stop search; low, so that beds that stop do so soon.
     pub search_inertial_number: f64,

@@ -157,7 +157,7 @@ impl<K: Kernel> Averager<K> {
         self.block_samples *= 2;
     }
 
-    /// Mean profile with standard errors (see [`Profile`]); `diameter` [m] and `grain_density` [kg/m³] enter the
+    /// Mean profile with standard errors (see [`Profile`]); `diameter` (m) and `grain_density` [kg/m³] enter the
     /// inertial number only.
     pub fn profile(&self, diameter: f64, grain_density: f64) -> Profile {
         let n = self.layers.count;

@@ -13,11 +13,11 @@ use std::f64::consts::{FRAC_1_SQRT_2, PI};
 
 /// A symmetric kernel W(x) ≥ 0 with ∫W = 1 and compact support [−`reach`, `reach`].
 pub trait Kernel {
-    /// Half-width of the support [m].
+    /// Half-width of the support (m).
     fn reach(&self) -> f64;
     /// Φ(x) = ∫₋∞ˣ W, from 0 to 1; x in metres.
     fn cumulative(&self, x: f64) -> f64;
-    /// Ψ(x) = ∫₋∞ˣ Φ [m]; equals x above the support.
+    /// Ψ(x) = ∫₋∞ˣ Φ (m); equals x above the support.
     fn double_cumulative(&self, x: f64) -> f64;
 }
 
@@ -41,7 +41,7 @@ impl Kernel for Layers {
 /// W = 1/(2w) for |x| ≤ w.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Heaviside {
-    /// Half-width w [m], positive.
+    /// Half-width w (m), positive.
     pub half_width: f64,
 }
 
@@ -68,7 +68,7 @@ impl Kernel for Heaviside {
 /// differentiable (Lucy 1977).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Lucy {
-    /// Half-width w of the support [m], positive.
+    /// Half-width w of the support (m), positive.
     pub half_width: f64,
 }
 
@@ -97,7 +97,7 @@ impl Kernel for Lucy {
 /// Gauss' kernel of standard deviation s, cut at 3 s and scaled up so that ∫W = 1.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Gauss {
-    /// Standard deviation s [m], positive.
+    /// Standard deviation s (m), positive.
     pub deviation: f64,
 }
 

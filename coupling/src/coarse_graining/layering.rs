@@ -5,21 +5,21 @@ use serde::{Deserialize, Serialize};
 /// Equal layers stacked along z.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Layering {
-    /// Lower face of the lowest layer [m].
+    /// Lower face of the lowest layer (m).
     pub lower: f64,
-    /// Thickness of a layer [m], positive.
+    /// Thickness of a layer (m), positive.
     pub thickness: f64,
     /// Number of layers.
     pub count: usize,
 }
 
 impl Layering {
-    /// Height of face k [m]; layer k lies between faces k and k + 1.
+    /// Height of face k (m); layer k lies between faces k and k + 1.
     pub fn face(&self, k: usize) -> f64 {
         self.lower + self.thickness * k as f64
     }
 
-    /// Height of the middle of layer k [m].
+    /// Height of the middle of layer k (m).
     pub fn centre(&self, k: usize) -> f64 {
         self.lower + self.thickness * (k as f64 + 0.5)
     }
@@ -51,7 +51,7 @@ impl Layering {
     }
 }
 
-/// Volume of the part of a sphere below height x above its centre [m³]:
+/// Volume of the part of a sphere below height x above its centre (m³):
 /// V = π (x + R)² (2R − x)/3 for |x| ≤ R, the spherical cap.
 pub fn sphere_volume_below(x: f64, radius: f64) -> f64 {
     let x = x.clamp(-radius, radius);

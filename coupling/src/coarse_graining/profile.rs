@@ -19,7 +19,7 @@ pub struct Estimate {
 /// One layer of a profile. Pressures are positive in compression, stresses positive in tension.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct ProfileRow {
-    /// Middle of the layer [m].
+    /// Middle of the layer (m).
     pub z: f64,
     /// Solid fraction of free grains, by exact volumes.
     pub phi: Estimate,
@@ -31,15 +31,15 @@ pub struct ProfileRow {
     pub v: Estimate,
     /// Velocity normal to the plane [m/s].
     pub w: Estimate,
-    /// Total stress [Pa], contact and kinetic, positive in tension; row = direction of the force.
+    /// Total stress (Pa), contact and kinetic, positive in tension; row = direction of the force.
     pub stress: [[Estimate; 3]; 3],
-    /// p = −trace(stress)/3 [Pa].
+    /// p = −trace(stress)/3 (Pa).
     pub p: Estimate,
-    /// −σ_zz [Pa].
+    /// −σ_zz (Pa).
     pub sigma_zz: Estimate,
-    /// |σ_xz| [Pa].
+    /// |σ_xz| (Pa).
     pub tau: Estimate,
-    /// Kinetic part of p [Pa].
+    /// Kinetic part of p (Pa).
     pub kinetic_p: Estimate,
     /// Granular temperature, trace⟨u′u′⟩/3 [m²/s²], about a velocity profile linear within the layer.
     pub temperature: Estimate,
@@ -80,11 +80,11 @@ pub struct BalanceCheck {
 pub struct Profile {
     /// Layers that ever held a free grain, from below.
     pub rows: Vec<ProfileRow>,
-    /// Thickness of a layer [m].
+    /// Thickness of a layer (m).
     pub layer: f64,
     /// Samples taken.
     pub samples: u64,
-    /// Time from the first to the last sample [s].
+    /// Time from the first to the last sample (s).
     pub duration: f64,
     /// Blocks behind the standard errors.
     pub blocks: usize,

@@ -6,9 +6,9 @@ use nalgebra::Vector3;
 
 /// Where each sum starts among the per-layer arrays; array f of layer k sits at `f · count + k`.
 pub(super) mod field {
-    /// Σ m W [kg].
+    /// Σ m W (kg).
     pub const MASS: usize = 0;
-    /// Σ volume inside the layer [m³].
+    /// Σ volume inside the layer (m³).
     pub const VOLUME: usize = 1;
     /// Σ m ζ W, ζ = zᵢ − centre of the layer [kg m].
     pub const MASS_ZETA: usize = 2;
@@ -22,7 +22,7 @@ pub(super) mod field {
     pub const FLUX: usize = 10;
     /// Σ f ⊗ a ∫W [N m], 9 parts, row = direction of the force.
     pub const CONTACT: usize = 16;
-    /// Σ m × (mean over the layer of the share above z, minus what lies in the layers above) [kg].
+    /// Σ m × (mean over the layer of the share above z, minus what lies in the layers above) (kg).
     pub const MASS_ABOVE: usize = 25;
     /// The same of the wall force [N], 3 parts.
     pub const WALL_ABOVE: usize = 26;
@@ -30,11 +30,11 @@ pub(super) mod field {
     pub const WALL: usize = 29;
     /// How many arrays there are.
     pub const COUNT: usize = 32;
-    /// After the arrays: mass of all free grains [kg].
+    /// After the arrays: mass of all free grains (kg).
     pub const TOTAL_MASS: usize = 0;
-    /// After the arrays: mass above the uppermost layer [kg].
+    /// After the arrays: mass above the uppermost layer (kg).
     pub const MASS_OVER_TOP: usize = 1;
-    /// After the arrays: mass below the lowest layer [kg].
+    /// After the arrays: mass below the lowest layer (kg).
     pub const MASS_UNDER_BOTTOM: usize = 2;
     /// How many numbers follow the arrays.
     pub const TAIL: usize = 3;

@@ -26,15 +26,15 @@ pub enum Outcome {
 /// The flow at one instant, free grains only.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct SeriesPoint {
-    /// Time [s].
+    /// Time (s).
     pub time: f64,
-    /// Kinetic energy, translation and rotation [J].
+    /// Kinetic energy, translation and rotation (J).
     pub kinetic_energy: f64,
     /// Mean velocity downslope, by mass [m/s].
     pub mean_velocity: f64,
-    /// Mass of the free grains [kg].
+    /// Mass of the free grains (kg).
     pub mass: f64,
-    /// Height of their centre of mass [m].
+    /// Height of their centre of mass (m).
     pub mean_height: f64,
 }
 
@@ -66,14 +66,14 @@ pub struct Cost {
     pub steps: u64,
     /// Steps times grains, fixed ones included.
     pub grain_steps: u64,
-    /// Time on the clock [s].
+    /// Time on the clock (s).
     pub wall_s: f64,
 }
 
 /// Result of one run.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct InclineResult {
-    /// Slope [degrees].
+    /// Slope (degrees).
     pub slope_degrees: f64,
     /// What the run was for.
     pub purpose: Purpose,
@@ -83,7 +83,7 @@ pub struct InclineResult {
     pub outcome: Outcome,
     /// Test of the mean velocity over the averaging time (without one: over the second half of the run).
     pub steady: SteadyTest,
-    /// Distance travelled downslope, mean over the grains [m].
+    /// Distance travelled downslope, mean over the grains (m).
     pub distance: f64,
     /// Series of energy and mean velocity.
     pub series: Vec<SeriesPoint>,
@@ -93,7 +93,7 @@ pub struct InclineResult {
     pub checks: Option<BalanceCheck>,
     /// Local points (I, μ, φ) of the profile.
     pub points: Vec<LocalPoint>,
-    /// Height of the flow [m]; of the bed, without a profile.
+    /// Height of the flow (m); of the bed, without a profile.
     pub height: f64,
     /// Cost.
     pub cost: Cost,

@@ -36,11 +36,11 @@ pub enum Purpose {
 /// One inclined-plane run.
 #[derive(Clone, Debug)]
 pub struct InclineSpec {
-    /// Slope θ [rad].
+    /// Slope θ (rad).
     pub slope: f64,
     /// Gravity [m/s²].
     pub gravity: f64,
-    /// Mean diameter of the grains d [m].
+    /// Mean diameter of the grains d (m).
     pub diameter: f64,
     /// Density of the grains' material [kg/m³].
     pub grain_density: f64,
@@ -54,17 +54,17 @@ pub struct InclineSpec {
     pub start: Start,
     /// What the run is for.
     pub purpose: Purpose,
-    /// Time step [s].
+    /// Time step (s).
     pub timestep: f64,
-    /// Least time before averaging begins, or before a search may end as flowing [s].
+    /// Least time before averaging begins, or before a search may end as flowing (s).
     pub relax_time: f64,
-    /// Averaging time [s].
+    /// Averaging time (s).
     pub average_time: f64,
-    /// Longest time of the whole run [s]; averaging begins `average_time` before it at the latest.
+    /// Longest time of the whole run (s); averaging begins `average_time` before it at the latest.
     pub max_time: f64,
     /// Steps between samples.
     pub sample_every: u64,
-    /// Thickness of the averaging layers [m].
+    /// Thickness of the averaging layers (m).
     pub layer: f64,
     /// Drift of the mean velocity, relative, that still counts as steady.
     pub steady_tolerance: f64,
@@ -184,7 +184,7 @@ impl InclineSpec {
         )
     }
 
-    /// Height of the highest free grain's top over z = 0 [m].
+    /// Height of the highest free grain's top over z = 0 (m).
     pub fn bed_height(&self) -> f64 {
         let tops = self
             .bed
@@ -194,7 +194,7 @@ impl InclineSpec {
         tops.fold(0.0, f64::max)
     }
 
-    /// Time between samples [s].
+    /// Time between samples (s).
     pub fn sample_interval(&self) -> f64 {
         self.sample_every as f64 * self.timestep
     }
