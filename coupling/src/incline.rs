@@ -63,7 +63,7 @@ impl InclineRun {
         spec.validate()?;
         let mut simulation = Simulation::new(spec.setup())?;
         if let Start::Flow { inertial_number } = spec.start {
-            let height = spec.bed_height();
+            let height = spec.bed_height() * spec.starting_stretch();
             // u(z) = (2/3)(I/d) √(φ g cos θ) [H^{3/2} − (H − z)^{3/2}] with a loose φ: Bagnold's profile.
             let scale = 2.0 / 3.0 * inertial_number / spec.diameter
                 * (spec::FLOWING_SOLID_FRACTION * spec.gravity * spec.slope.cos()).sqrt();

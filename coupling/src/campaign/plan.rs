@@ -27,10 +27,9 @@ pub struct GuessedLaw {
 }
 
 impl GuessedLaw {
-    /// I = I_0 (tan θ − μ_s)/(μ_2 − tan θ), kept within 0.05 and 0.6: a settled bed set faster than that bursts
-    /// as it dilates, and its top flies for tens of √(d/g).
+    /// I = I_0 (tan θ − μ_s)/(μ_2 − tan θ), kept within 0.05 and 0.8.
     pub fn inertial_number(&self, slope: f64) -> f64 {
-        const RANGE: (f64, f64) = (0.05, 0.6);
+        const RANGE: (f64, f64) = (0.05, 0.8);
         let t = slope.tan();
         // At μ_2 and beyond, the law has no steady flow.
         if t >= self.mu_2 {
@@ -97,7 +96,7 @@ impl CampaignSpec {
         Self {
             base,
             published_material: Some("moderate".into()),
-            flow_angles_degrees: vec![28.0, 29.5, 31.0, 33.0, 35.0, 36.0],
+            flow_angles_degrees: vec![28.0, 29.5, 31.0, 33.0, 35.0, 37.0],
             guessed_law: GuessedLaw {
                 mu_s: 0.45,
                 mu_2: 0.95,

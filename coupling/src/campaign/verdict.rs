@@ -140,7 +140,7 @@ fn judge_runs(e: &Evidence, good: &mut bool, text: &mut Vec<String>) {
     if weight > LARGEST_WEIGHT_ERROR {
         *good = false;
         text.push(format!(
-            "sigma_zz misses the weight above by up to {:.1} % (more than {:.0} %): averages are too short.",
+            "sigma_zz misses the weight above by up to {:.1} % (more than {:.0} %): averages are short or the bed still swings.",
             100.0 * weight, 100.0 * LARGEST_WEIGHT_ERROR
         ));
     } else if e.used > 0 {
