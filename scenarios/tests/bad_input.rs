@@ -1,0 +1,263 @@
+//! Bad input: exit status 2, one message that names key, value and range, nothing written.
+
+mod command;
+
+use command::colluvium;
+use std::fs;
+
+/// Arguments, and what the message has to contain.
+const CASES: &[(&[&str], &[&str])] = &[
+    (
+        &["run", "incline-moderate", "--set", "slope_degrees=90"],
+        &["slope_degrees", "90", "[0, 90)"],
+    ),
+    (
+        &["run", "incline-moderate", "--set", "slope_degrees=-1"],
+        &["slope_degrees", "-1", "[0, 90)"],
+    ),
+    (
+        &["run", "incline-moderate", "--set", "slope_degrees=nan"],
+        &["slope_degrees", "nan", "[0, 90)"],
+    ),
+    (
+        &["run", "incline-moderate", "--set", "slope_degrees=steep"],
+        &["slope_degrees", "steep", "number"],
+    ),
+    (
+        &["run", "incline-moderate", "--set", "slop_degrees=30"],
+        &["slop_degrees", "did you mean `slope_degrees`"],
+    ),
+    (
+        &["run", "incline-moderate", "--set", "contact.fricton=1"],
+        &["contact.fricton", "`contact.friction`"],
+    ),
+    (
+        &["run", "incline-moderate", "--set", "contact=3"],
+        &["contact", "3", "table"],
+    ),
+    (
+        &["run", "incline-moderate", "--set", "seed=1.5"],
+        &["seed", "1.5", "integer"],
+    ),
+    (
+        &["run", "incline-moderate", "--set", "seed=-1"],
+        &["seed", "-1", "[0"],
+    ),
+    (
+        &["run", "incline-moderate", "--set", "start=\"running\""],
+        &["start", "running", "rest, flow"],
+    ),
+    (
+        &["run", "incline-moderate", "--set", "scale=0"],
+        &["scale", "0", "[0.4, 50]"],
+    ),
+    (
+        &["run", "incline-moderate", "--set", "grains.diameter=-0.01"],
+        &["grains.diameter", "-0.01", "(0, 10]"],
+    ),
+    (
+        &[
+            "run",
+            "incline-moderate",
+            "--set",
+            "contact.restitution=1.5",
+        ],
+        &["contact.restitution", "1.5", "1]"],
+    ),
+    (
+        &["run", "incline-moderate", "--set", "contact.friction=0"],
+        &["contact.friction", "0", "rolling"],
+    ),
+    (
+        &["run", "incline-moderate", "--set", "time.limit=0.1"],
+        &["time.limit", "0.1", "1.76"],
+    ),
+    (
+        &[
+            "run",
+            "incline-moderate",
+            "--set",
+            "calibration.stop.high=10",
+        ],
+        &["calibration.stop.high", "10", "24"],
+    ),
+    (
+        &[
+            "run",
+            "incline-moderate",
+            "--set",
+            "calibration.flow_degrees=[30, 95]",
+        ],
+        &["calibration.flow_degrees[1]", "95", "90"],
+    ),
+    (
+        &[
+            "run",
+            "incline-moderate",
+            "--set",
+            "contact.stiffness=1e5",
+            "--set",
+            "contact.stiffness_scaled=1e4",
+        ],
+        &["contact.stiffness", "contact.stiffness_scaled", "exclude"],
+    ),
+    (
+        &["run", "incline-moderate", "--set", "slope_degrees"],
+        &["KEY=VALUE", "slope_degrees"],
+    ),
+    (
+        &["run", "incline-moderate", "--set", "scene=bagnold"],
+        &["scene", "bagnold"],
+    ),
+    (
+        &["run", "two-spheres", "--set", "radius=-0.5"],
+        &["radius", "-0.5", "(0, 100]"],
+    ),
+    (
+        &["run", "two-spheres", "--set", "density=0"],
+        &["density", "0", "(0, 30000]"],
+    ),
+    (
+        &["run", "sphere-on-plane", "--set", "impact_degrees=91"],
+        &["impact_degrees", "91", "[0, 90]"],
+    ),
+    (
+        &["run", "bagnold", "--set", "grid.cells=-3"],
+        &["grid.cells", "-3", "[4, 4096]"],
+    ),
+    (
+        &["run", "bagnold", "--set", "grid.columns=2"],
+        &["grid.columns", "2", "3 to 256"],
+    ),
+    (
+        &["run", "bagnold", "--set", "slope_degrees=60"],
+        &["slope_degrees", "60", "39.17"],
+    ),
+    (
+        &["run", "bagnold", "--set", "rheology.mu_2=0.1"],
+        &["rheology.mu_2", "0.1", "0.506"],
+    ),
+    (
+        &["run", "bagnold", "--set", "rheology.file=missing.toml"],
+        &["rheology.file", "missing.toml", "cannot read"],
+    ),
+    (
+        &[
+            "run",
+            "bagnold",
+            "--set",
+            "rheology.file=law.toml",
+            "--set",
+            "rheology.mu_s=0.4",
+        ],
+        &["rheology.file", "rheology.mu_s", "exclude"],
+    ),
+    (
+        &["run", "bagnold", "--set", "rheology.file=law.toml"],
+        &["rheology.file", "law.toml", "mu_2", "0.1"],
+    ),
+    (
+        &["run", "bagnold", "--set", "rheology.file=not.toml"],
+        &["rheology.file", "not.toml"],
+    ),
+    (&["run", "absent.toml"], &["absent.toml", "cannot read"]),
+    (
+        &["run", "bagnoldd"],
+        &["bagnoldd", "did you mean `bagnold`"],
+    ),
+    (&["run", "broken.toml"], &["broken.toml", "line 2"]),
+    (
+        &["run", "unknown-kind.toml"],
+        &["scene", "landslide", "bagnold"],
+    ),
+    (&["run", "no-kind.toml"], &["scene", "missing", "bagnold"]),
+    (&["run", "bagnold", "--threads", "0"], &["--threads", "0"]),
+    (&["run", "bagnold", "--resume"], &["--resume", "--out"]),
+    (
+        &["run", "bagnold", "--out", "broken.toml"],
+        &["--out", "broken.toml", "file"],
+    ),
+    (
+        &["run", "bagnold", "--out", "broken.toml/deep"],
+        &["--out", "broken.toml/deep", "cannot write"],
+    ),
+    (
+        &["run", "bagnold", "--out", "others"],
+        &["--out", "others", "not empty"],
+    ),
+    (&["calibrate", "bagnold"], &["bagnold", "incline-moderate"]),
+    (
+        &["pareto", "bagnold", "--vary", "grid.cells"],
+        &["--vary", "grid.cells", "KEY=A,B,C"],
+    ),
+    (
+        &["pareto", "bagnold", "--vary", "grid.cells=16,-1"],
+        &["grid.cells", "-1", "[4, 4096]"],
+    ),
+    (
+        &["pareto", "incline-glass", "--vary", "seed=1,2"],
+        &["incline-glass", "--reference"],
+    ),
+    (&["report", "nowhere"], &["nowhere", "summary.json"]),
+    (&["scenes", "show", "nothing"], &["nothing", "bagnold"]),
+    (&["walk"], &["walk"]),
+];
+
+#[test]
+fn bad_input_ends_with_status_2_and_leaves_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    fs::write(
+        at("broken.toml"),
+        "scene = \"bagnold\"\nslope_degrees = = 3\n",
+    )
+    .unwrap();
+    fs::write(at("unknown-kind.toml"), "scene = \"landslide\"\n").unwrap();
+    fs::write(at("no-kind.toml"), "slope_degrees = 3.0\n").unwrap();
+    fs::write(
+        at("law.toml"),
+        "mu_s = 0.4\nmu_2 = 0.1\ni_0 = 0.3\ndiameter = 0.01\nsolid_fraction = 0.5\n",
+    )
+    .unwrap();
+    fs::write(at("not.toml"), "{ \"json\": true }").unwrap();
+    fs::create_dir(at("others")).unwrap();
+    fs::write(at("others/diary.md"), "mine").unwrap();
+    let listing = || {
+        let mut names: Vec<_> = fs::read_dir(folder.path())
+            .unwrap()
+            .map(|e| e.unwrap().file_name())
+            .collect();
+        names.sort();
+        names
+    };
+    let before = listing();
+    for (arguments, wanted) in CASES {
+        let done = colluvium(folder.path(), arguments);
+        let message = String::from_utf8_lossy(&done.stderr);
+        assert_eq!(done.status.code(), Some(2), "{arguments:?}: {message}");
+        for part in *wanted {
+            assert!(
+                message.contains(part),
+                "{arguments:?}: `{part}` is not in: {message}"
+            );
+        }
+        assert_eq!(listing(), before, "{arguments:?} left something behind");
+    }
+    assert_eq!(fs::read_dir(at("others")).unwrap().count(), 1);
+}
+
+#[test]
+fn a_run_of_ours_may_be_replaced_and_nothing_else() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |out: &str| {
+        colluvium(
+            folder.path(),
+            &["run", "bagnold", "--set", "grid.cells=8", "--out", out],
+        )
+    };
+    assert!(run("a/b").status.success());
+    fs::write(folder.path().join("a/b/notes.md"), "mine").unwrap();
+    assert!(run("a/b").status.success());
+    assert!(folder.path().join("a/b/notes.md").exists());
+    assert_eq!(run("a").status.code(), Some(2));
+}

@@ -1,0 +1,57 @@
+//! Running the binary and reading what it wrote.
+
+#![allow(dead_code)] // each test file uses its own part
+
+use serde_json::Value;
+use std::path::Path;
+use std::process::{Command, Output};
+
+/// Runs `colluvium` in a folder.
+pub fn colluvium(folder: &Path, arguments: &[&str]) -> Output {
+    Command::new(env!("CARGO_BIN_EXE_colluvium"))
+        .args(arguments)
+        .current_dir(folder)
+        .output()
+        .unwrap()
+}
+
+/// Runs it and expects success; gives stdout.
+pub fn succeed(folder: &Path, arguments: &[&str]) -> String {
+    let done = colluvium(folder, arguments);
+    let message = String::from_utf8_lossy(&done.stderr);
+    assert!(done.status.success(), "{arguments:?}: {message}");
+    assert!(
+        message.is_empty(),
+        "not quiet without a terminal: {message}"
+    );
+    String::from_utf8(done.stdout).unwrap()
+}
+
+/// The summary of a run directory.
+pub fn summary(directory: &Path) -> Value {
+    let text = std::fs::read_to_string(directory.join("summary.json")).unwrap();
+    serde_json::from_str(&text).unwrap()
+}
+
+/// The value of a result.
+pub fn value(summary: &Value, name: &str) -> f64 {
+    summary["results"][name]["value"]
+        .as_f64()
+        .unwrap_or(f64::NAN)
+}
+
+/// A CSV table: header and rows.
+pub fn table(path: &Path) -> (Vec<String>, Vec<Vec<f64>>) {
+    let mut reader = csv::Reader::from_path(path).unwrap();
+    let header = reader.headers().unwrap().iter().map(String::from).collect();
+    let rows = reader
+        .records()
+        .map(|r| {
+            r.unwrap()
+                .iter()
+                .map(|x| x.parse().unwrap_or(f64::NAN))
+                .collect()
+        })
+        .collect();
+    (header, rows)
+}

@@ -1,0 +1,179 @@
+//! The same bits for any number of threads, and after an interruption.
+
+mod command;
+
+use command::{colluvium, succeed, summary};
+use std::path::Path;
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// A small, soft and short incline: seconds, not minutes.
+const SMALL: &[&str] = &[
+    "--set",
+    "scale=0.85",
+    "--set",
+    "grains.count=300",
+    "--set",
+    "contact.stiffness_scaled=2e3",
+    "--set",
+    "time.relax=0.3",
+    "--set",
+    "time.average=0.3",
+    "--set",
+    "time.limit=0.9",
+];
+
+fn arguments<'a>(command: &'a str, out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+    let mut list = vec![command, "incline-moderate", "--out", out];
+    list.extend(SMALL);
+    list.extend(more);
+    list
+}
+
+fn hash(directory: &Path) -> String {
+    let summary = summary(directory);
+    assert_eq!(summary["status"], "done");
+    summary["state_hash"].as_str().unwrap().to_owned()
+}
+
+/// Interrupts the command once `ready` holds; gives its exit status.
+fn interrupt(folder: &Path, arguments: &[&str], ready: impl Fn() -> bool) -> Option<i32> {
+    let mut child = Command::new(env!("CARGO_BIN_EXE_colluvium"))
+        .args(arguments)
+        .current_dir(folder)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let start = Instant::now();
+    while !ready() && start.elapsed() < Duration::from_secs(120) {
+        std::thread::sleep(Duration::from_millis(20));
+    }
+    let id = child.id().to_string();
+    assert!(
+        Command::new("kill")
+            .args(["-INT", &id])
+            .status()
+            .unwrap()
+            .success()
+    );
+    child.wait().unwrap().code()
+}
+
+#[test]
+fn threads_do_not_change_a_bit() {
+    let folder = tempfile::tempdir().unwrap();
+    for (threads, out) in [("1", "one"), ("2", "two")] {
+        succeed(
+            folder.path(),
+            &arguments("run", out, &["--threads", threads]),
+        );
+    }
+    assert_eq!(
+        hash(&folder.path().join("one")),
+        hash(&folder.path().join("two"))
+    );
+}
+
+#[test]
+fn an_interrupted_run_goes_on_to_the_same_state() {
+    let folder = tempfile::tempdir().unwrap();
+    let whole = folder.path().join("whole");
+    let parts = folder.path().join("parts");
+    succeed(folder.path(), &arguments("run", "whole", &[]));
+    let log = || std::fs::read_to_string(parts.join("log.txt")).unwrap_or_default();
+    // The bed is logged when it has settled: the interruption then falls into the flow.
+    let status = interrupt(folder.path(), &arguments("run", "parts", &[]), || {
+        log().contains("bed:")
+    });
+    assert_eq!(status, Some(130));
+    assert_eq!(summary(&parts)["status"], "interrupted");
+    let checkpoint = parts.join("checkpoint.h5");
+    let saved = std::fs::read(&checkpoint).unwrap();
+
+    // A truncated checkpoint is refused, and nothing is touched.
+    std::fs::write(&checkpoint, &saved[..saved.len() / 3]).unwrap();
+    let refused = colluvium(folder.path(), &arguments("run", "parts", &["--resume"]));
+    assert_eq!(refused.status.code(), Some(2));
+    let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert!(message.contains("checkpoint.h5"), "{message}");
+    assert_eq!(std::fs::read(&checkpoint).unwrap().len(), saved.len() / 3);
+    std::fs::write(&checkpoint, &saved).unwrap();
+
+    // Another scene is refused.
+    let other = colluvium(
+        folder.path(),
+        &arguments("run", "parts", &["--resume", "--set", "slope_degrees=30"]),
+    );
+    assert_eq!(other.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&other.stderr).contains("slope_degrees"));
+
+    succeed(folder.path(), &arguments("run", "parts", &["--resume"]));
+    assert_eq!(hash(&parts), hash(&whole));
+    let profile = |d: &Path| std::fs::read_to_string(d.join("profile.csv")).unwrap();
+    assert_eq!(profile(&parts), profile(&whole));
+    assert!(!checkpoint.exists());
+}
+
+#[test]
+fn a_stopped_campaign_keeps_its_angles_and_ends_the_same() {
+    let folder = tempfile::tempdir().unwrap();
+    let short = [
+        "--set",
+        "calibration.flow_degrees=[31, 33, 36]",
+        "--set",
+        "calibration.search_time=0.3",
+        "--set",
+        "calibration.stop.resolution=8",
+        "--set",
+        "calibration.onset.resolution=10",
+        "--set",
+        "calibration.compare_degrees=[33]",
+        "--set",
+        "calibration.compare_cells=16",
+    ];
+    let parts = folder.path().join("parts");
+    let angles = parts.join("angles.json");
+    let status = interrupt(
+        folder.path(),
+        &arguments("calibrate", "parts", &short),
+        || angles.exists(),
+    );
+    assert_eq!(status, Some(130));
+    let log = || std::fs::read_to_string(parts.join("log.txt")).unwrap();
+    let resumed = [&short[..], &["--resume"]].concat();
+    succeed(folder.path(), &arguments("calibrate", "parts", &resumed));
+    assert!(log().contains("finished before"), "{}", log());
+    let one = [&short[..], &["--threads", "1"]].concat();
+    succeed(folder.path(), &arguments("calibrate", "whole", &one));
+    assert_eq!(hash(&parts), hash(&folder.path().join("whole")));
+
+    let law = std::fs::read_to_string(parts.join("rheology.toml")).unwrap();
+    for key in [
+        "mu_s",
+        "mu_2_error",
+        "valid_i",
+        "covariance",
+        "[mu_zz]",
+        "[provenance]",
+    ] {
+        assert!(law.contains(key), "{key} is not in {law}");
+    }
+    let page = std::fs::read_to_string(parts.join("report.html")).unwrap();
+    for part in ["Angles tried", "Table 2.6", "LAMMPS", "grain-steps"] {
+        assert!(page.contains(part), "{part}");
+    }
+    succeed(
+        folder.path(),
+        &[
+            "run",
+            "bagnold",
+            "--set",
+            "rheology.file=parts/rheology.toml",
+            "--set",
+            "slope_degrees=20",
+            "--out",
+            "b",
+        ],
+    );
+}

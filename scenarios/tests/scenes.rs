@@ -1,0 +1,189 @@
+//! Scenes from the command line to their results.
+
+mod command;
+
+use command::{colluvium, succeed, summary, table, value};
+use std::f64::consts::PI;
+
+#[test]
+fn bagnold_meets_the_exact_profile() {
+    let folder = tempfile::tempdir().unwrap();
+    succeed(
+        folder.path(),
+        &["run", "bagnold", "--out", "b", "--set", "slope_degrees=31"],
+    );
+    let (header, rows) = table(&folder.path().join("b/profile.csv"));
+    assert_eq!(header[..3], ["z", "u", "p"]);
+    // The formula, on its own: u = (2/3)(I/d) √(φ g cos θ) [h^{3/2} − (h − z)^{3/2}].
+    let (theta, h, g, d, phi) = (31.0 * PI / 180.0, 0.24_f64, 9.81, 0.01, 0.5);
+    let (mu_s, mu_2, i_0): (f64, f64, f64) = (0.506, 0.815, 0.332);
+    let i = i_0 * (f64::tan(theta) - mu_s) / (mu_2 - f64::tan(theta));
+    let scale = 2.0 / 3.0 * i / d * (phi * g * f64::cos(theta)).sqrt();
+    let (mut miss, mut size) = (0.0, 0.0);
+    for row in &rows {
+        let (z, u, p) = (row[0], row[1], row[2]);
+        let exact = scale * (h.powf(1.5) - (h - z).powf(1.5));
+        miss += (u - exact) * (u - exact);
+        size += exact * exact;
+        let weight = phi * 2500.0 * g * f64::cos(theta) * (h - z);
+        assert!((p - weight).abs() < 1e-6 * weight, "p = {p} at {z}");
+    }
+    assert_eq!(rows.len(), 64);
+    assert!(
+        (miss / size).sqrt() < 1e-4,
+        "relative L2 error {}",
+        (miss / size).sqrt()
+    );
+    let summary = summary(&folder.path().join("b"));
+    assert_eq!(summary["format"], 1);
+    assert_eq!(summary["status"], "done");
+    assert!((value(&summary, "inertial_number") - i).abs() < 1e-9);
+    for file in ["scene.toml", "report.html", "results.h5", "log.txt"] {
+        assert!(folder.path().join("b").join(file).exists(), "{file}");
+    }
+    assert!(!folder.path().join("b/checkpoint.h5").exists());
+}
+
+#[test]
+fn bagnold_converges_at_second_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let shown = succeed(
+        folder.path(),
+        &[
+            "pareto",
+            "bagnold",
+            "--vary",
+            "grid.cells=16,32,64",
+            "--out",
+            "p",
+        ],
+    );
+    assert!(shown.contains("grid.cells"), "{shown}");
+    let (header, rows) = table(&folder.path().join("p/pareto.csv"));
+    let order = header.iter().position(|h| h == "order").unwrap();
+    assert!(rows[1..].iter().all(|row| row[order] > 1.8), "{rows:?}");
+}
+
+#[test]
+fn a_rheology_file_is_read_and_its_validity_flagged() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(
+        folder.path().join("law.toml"),
+        "mu_s = 0.4\nmu_2 = 0.8\ni_0 = 0.3\ndiameter = 0.01\nsolid_fraction = 0.55\nvalid_i = [0.05, 0.2]\n",
+    )
+    .unwrap();
+    let run = |slope: &str, out: &str| {
+        let set = format!("slope_degrees={slope}");
+        let law = "rheology.file=law.toml";
+        succeed(
+            folder.path(),
+            &["run", "bagnold", "--set", law, "--set", &set, "--out", out],
+        );
+        summary(&folder.path().join(out))["remarks"].to_string()
+    };
+    assert!(!run("26", "inside").contains("Outside"));
+    let remarks = run("35", "outside");
+    assert!(remarks.contains("Outside the calibration"), "{remarks}");
+    let report = std::fs::read_to_string(folder.path().join("outside/report.html")).unwrap();
+    assert!(report.contains("Outside the calibration"));
+    // The resolved scene stands alone.
+    std::fs::remove_file(folder.path().join("law.toml")).unwrap();
+    succeed(
+        folder.path(),
+        &["run", "inside/scene.toml", "--out", "again"],
+    );
+    let hash = |out: &str| summary(&folder.path().join(out))["state_hash"].clone();
+    assert_eq!(hash("again"), hash("inside"));
+}
+
+#[test]
+fn impacts_recover_restitution_and_contact_time() {
+    let folder = tempfile::tempdir().unwrap();
+    for (scene, bodies) in [("two-spheres", 2), ("sphere-on-plane", 1)] {
+        for (restitution, angle) in [("0.2", "0"), ("0.5", "0"), ("0.9", "35"), ("1", "70")] {
+            let e = format!("restitution={restitution}");
+            let a = format!("impact_degrees={angle}");
+            let e_t = "tangential_restitution=1";
+            succeed(
+                folder.path(),
+                &[
+                    "run", scene, "--out", "i", "--set", &e, "--set", &a, "--set", e_t,
+                ],
+            );
+            let summary = summary(&folder.path().join("i"));
+            let wanted: f64 = restitution.parse().unwrap();
+            let found = value(&summary, "restitution");
+            assert!(
+                (found - wanted).abs() < 1e-3,
+                "{scene} {restitution} {angle}: {found}"
+            );
+            let mass = 2500.0 * 4.0 / 3.0 * PI * 0.005_f64.powi(3);
+            let reduced = mass / f64::from(bodies);
+            let time = (reduced * (PI * PI + wanted.ln().powi(2)) / 2.6e5).sqrt();
+            assert!((value(&summary, "contact_time") / time - 1.0).abs() < 2e-3);
+            let before = value(&summary, "energy_before");
+            assert!(value(&summary, "energy_after") <= before * (1.0 + 1e-6));
+            assert!(summary["ledger"]["momentum_relative"].as_f64().unwrap() < 1e-12);
+            let (header, rows) = table(&folder.path().join("i/trajectory.csv"));
+            assert_eq!(
+                header[..10],
+                [
+                    "t", "x1", "y1", "z1", "vx1", "vy1", "vz1", "wx1", "wy1", "wz1"
+                ]
+            );
+            assert_eq!(header.len(), 1 + 9 * bodies as usize);
+            assert!(rows.len() >= 1000);
+        }
+    }
+}
+
+#[test]
+fn every_bundled_scene_can_be_listed_shown_checked_and_planned() {
+    let folder = tempfile::tempdir().unwrap();
+    let list = succeed(folder.path(), &["scenes"]);
+    for line in list.lines() {
+        let name = line.split_whitespace().next().unwrap();
+        let text = succeed(folder.path(), &["scenes", "show", name]);
+        std::fs::write(folder.path().join("own.toml"), text).unwrap();
+        succeed(folder.path(), &["check", "own.toml"]);
+        let plan = succeed(folder.path(), &["plan", name]);
+        for topic in ["left out", "time step"] {
+            assert!(plan.contains(topic), "{name}: {plan}");
+        }
+    }
+    assert_eq!(list.lines().count(), 6);
+}
+
+#[test]
+fn the_schema_is_json_and_knows_every_scene() {
+    let folder = tempfile::tempdir().unwrap();
+    let text = succeed(folder.path(), &["schema"]);
+    let schema: serde_json::Value = serde_json::from_str(&text).unwrap();
+    assert_eq!(schema["oneOf"].as_array().unwrap().len(), 6);
+    // Every reference leads somewhere.
+    for part in text.split("\"$ref\": \"#").skip(1) {
+        let pointer = part.split('"').next().unwrap();
+        assert!(schema.pointer(pointer).is_some(), "{pointer}");
+    }
+}
+
+#[test]
+fn several_runs_make_one_report() {
+    let folder = tempfile::tempdir().unwrap();
+    succeed(folder.path(), &["run", "two-spheres", "--out", "a"]);
+    succeed(
+        folder.path(),
+        &["run", "bagnold", "--set", "grid.cells=8", "--out", "b"],
+    );
+    succeed(folder.path(), &["report", "a", "b", "--out", "both.html"]);
+    let page = std::fs::read_to_string(folder.path().join("both.html")).unwrap();
+    assert!(page.contains("Run of two-spheres") && page.contains("Run of bagnold"));
+    // Self-contained: nothing is fetched.
+    assert!(!page.contains("src=") && !page.contains("<link"));
+    assert_eq!(
+        colluvium(folder.path(), &["report", "a", "nowhere"])
+            .status
+            .code(),
+        Some(2)
+    );
+}
