@@ -41,14 +41,14 @@ fn write_arrays(path: &Path, scene: &str, checkpoint: &Checkpoint) -> hdf5::Resu
         numbers
             .new_dataset_builder()
             .with_data(values)
-            .create(name.as_str())?;
+            .create(flat(name).as_str())?;
     }
     let counts = file.create_group("counts")?;
     for (name, values) in &checkpoint.record.counts {
         counts
             .new_dataset_builder()
             .with_data(values)
-            .create(name.as_str())?;
+            .create(flat(name).as_str())?;
     }
     attribute(&file, "version", env!("CARGO_PKG_VERSION"))?;
     attribute(&file, "scene", scene)?;
@@ -59,6 +59,11 @@ fn write_arrays(path: &Path, scene: &str, checkpoint: &Checkpoint) -> hdf5::Resu
     // Last, so that a file without it was not finished.
     attribute(&file, "format", FORMAT)?;
     file.flush()
+}
+
+/// An array's name without slashes, which HDF5 takes for folders.
+fn flat(name: &str) -> String {
+    name.replace('/', ":")
 }
 
 /// Reads a checkpoint of a scene; says what is wrong with a truncated or foreign file.
@@ -98,12 +103,18 @@ fn read_arrays(file: &hdf5::File) -> hdf5::Result<Checkpoint> {
     let numbers = file.group("numbers")?;
     for name in numbers.member_names()? {
         let values = numbers.dataset(&name)?.read_raw::<f64>()?;
-        checkpoint.record.numbers.insert(name, values);
+        checkpoint
+            .record
+            .numbers
+            .insert(name.replace(':', "/"), values);
     }
     let counts = file.group("counts")?;
     for name in counts.member_names()? {
         let values = counts.dataset(&name)?.read_raw::<u64>()?;
-        checkpoint.record.counts.insert(name, values);
+        checkpoint
+            .record
+            .counts
+            .insert(name.replace(':', "/"), values);
     }
     Ok(checkpoint)
 }
@@ -125,7 +136,7 @@ mod tests {
         let mut record = Record::default();
         record
             .numbers
-            .insert("position".into(), vec![1.0 / 3.0, -0.0, 5e-324]);
+            .insert("dem/grains/place".into(), vec![1.0 / 3.0, -0.0, 5e-324]);
         record.numbers.insert("empty".into(), Vec::new());
         record.counts.insert("partner".into(), vec![0, u64::MAX]);
         Checkpoint {

@@ -1,5 +1,7 @@
 //! The same bits for any number of threads, and after an interruption.
 
+#![allow(clippy::unwrap_used)] // a test may panic
+
 mod command;
 
 use command::{colluvium, succeed, summary};
@@ -118,7 +120,10 @@ fn an_interrupted_run_goes_on_to_the_same_state() {
 #[test]
 fn a_stopped_campaign_keeps_its_angles_and_ends_the_same() {
     let folder = tempfile::tempdir().unwrap();
+    // Deep enough to have layers away from base and surface.
     let short = [
+        "--set",
+        "grains.count=900",
         "--set",
         "calibration.flow_degrees=[31, 33, 36]",
         "--set",

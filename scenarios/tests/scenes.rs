@@ -1,5 +1,7 @@
 //! Scenes from the command line to their results.
 
+#![allow(clippy::unwrap_used)] // a test may panic
+
 mod command;
 
 use command::{colluvium, succeed, summary, table, value};
@@ -113,14 +115,16 @@ fn impacts_recover_restitution_and_contact_time() {
             let summary = summary(&folder.path().join("i"));
             let wanted: f64 = restitution.parse().unwrap();
             let found = value(&summary, "restitution");
+            // In an oblique impact the line of centres turns while they touch, by v_t τ/(2 R).
+            let allowed = if angle == "0" { 1e-3 } else { 1e-2 };
             assert!(
-                (found - wanted).abs() < 1e-3,
+                (found - wanted).abs() < allowed,
                 "{scene} {restitution} {angle}: {found}"
             );
             let mass = 2500.0 * 4.0 / 3.0 * PI * 0.005_f64.powi(3);
             let reduced = mass / f64::from(bodies);
             let time = (reduced * (PI * PI + wanted.ln().powi(2)) / 2.6e5).sqrt();
-            assert!((value(&summary, "contact_time") / time - 1.0).abs() < 2e-3);
+            assert!((value(&summary, "contact_time") / time - 1.0).abs() < 2.0 * allowed);
             let before = value(&summary, "energy_before");
             assert!(value(&summary, "energy_after") <= before * (1.0 + 1e-6));
             assert!(summary["ledger"]["momentum_relative"].as_f64().unwrap() < 1e-12);

@@ -1,7 +1,7 @@
 //! The report of a calibration.
 
 use super::page::{figure, number, with_error};
-use super::plot::{Mark, Plot};
+use super::plot::{Band, Mark, Plot};
 use super::{Record, results};
 use crate::calibrate::{CAMPAIGN, published_material};
 use colluvium_coupling::calibration::MuIFit;
@@ -175,10 +175,10 @@ fn law(record: &Record, campaign: &Campaign) -> Markup {
             .map(|k| low + (high - low) * f64::from(k) / 80.0)
             .collect();
         let band: Vec<(f64, (f64, f64))> = grid.iter().map(|i| (*i, fit.band(*i))).collect();
-        plot.bands.push((
-            6,
-            band.iter().map(|(i, (m, e))| (*i, m - e, m + e)).collect(),
-        ));
+        plot.bands.push(Band {
+            colour: 6,
+            points: band.iter().map(|(i, (m, e))| (*i, m - e, m + e)).collect(),
+        });
         plot = plot.with(
             "fit ± 1 σ",
             Mark::Line,
@@ -196,13 +196,13 @@ fn law(record: &Record, campaign: &Campaign) -> Markup {
     if let Some(peer) = peer {
         plot = plot.with(
             "LAMMPS",
-            Mark::Dots,
+            Mark::Rings,
             5,
             vec![(peer.inertial_number, peer.friction)],
         );
         fraction = fraction.with(
             "LAMMPS",
-            Mark::Dots,
+            Mark::Rings,
             5,
             vec![(peer.inertial_number, peer.solid_fraction)],
         );

@@ -22,6 +22,7 @@ figcaption{color:var(--soft);font-size:.88rem;margin-top:.2rem;max-width:64ch}
 svg{width:100%;height:auto;display:block;font-family:inherit}
 svg text{fill:var(--ink);font-family:inherit}
 svg [stroke='#000000']{stroke:var(--ink)}
+svg [fill='#FFFFFF']{fill:var(--paper)}
 .wide{overflow-x:auto}
 table{border-collapse:collapse;margin:.8rem 0;font-size:.92rem;font-variant-numeric:tabular-nums}
 th,td{padding:.32rem .8rem;border-bottom:1px solid var(--line);text-align:right;white-space:nowrap}
@@ -95,6 +96,10 @@ pub fn with_error(value: f64, error: f64) -> String {
     if !(error.is_finite() && error > 0.0 && value.is_finite()) {
         return number(value);
     }
+    // A value that its error swamps, or that is huge, is no number to be read to the last digit.
+    if error.max(value.abs()) >= 1e5 {
+        return format!("{} ± {}", number(value), number(error));
+    }
     let digits = (1 - error.log10().floor() as i32).clamp(0, 12) as usize;
     format!("{value:.digits$} ± {error:.digits$}")
 }
@@ -104,7 +109,7 @@ pub fn count(value: u64) -> String {
     let digits = value.to_string();
     let mut text = String::new();
     for (n, digit) in digits.chars().enumerate() {
-        if n > 0 && (digits.len() - n) % 3 == 0 {
+        if n > 0 && (digits.len() - n).is_multiple_of(3) {
             text.push('\u{2009}');
         }
         text.push(digit);
@@ -121,6 +126,7 @@ mod tests {
         assert_eq!(number(0.0331549), "0.03315");
         assert_eq!(number(1234.56), "1235");
         assert_eq!(with_error(0.50612, 0.0194), "0.506 ± 0.019");
+        assert_eq!(with_error(8.2e12, 7.5e18), "8.200e12 ± 7.500e18");
         assert_eq!(count(1234567), "1\u{2009}234\u{2009}567");
     }
 }

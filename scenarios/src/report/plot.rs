@@ -29,6 +29,8 @@ pub enum Mark {
     Dashes,
     /// Dots.
     Dots,
+    /// Large rings, to stand out among dots.
+    Rings,
 }
 
 /// One curve.
@@ -46,6 +48,15 @@ pub struct Series {
     pub errors: Vec<f64>,
 }
 
+/// The area between two curves.
+#[derive(Clone, Debug)]
+pub struct Band {
+    /// Index into the palette.
+    pub colour: usize,
+    /// Points (x, low, high).
+    pub points: Vec<(f64, f64, f64)>,
+}
+
 /// A plot with labelled axes.
 #[derive(Clone, Debug, Default)]
 pub struct Plot {
@@ -61,8 +72,8 @@ pub struct Plot {
     pub from_zero: bool,
     /// Curves.
     pub series: Vec<Series>,
-    /// Bands: colour, and points (x, low, high).
-    pub bands: Vec<(usize, Vec<(f64, f64, f64)>)>,
+    /// Bands behind the curves.
+    pub bands: Vec<Band>,
 }
 
 impl Plot {
@@ -105,7 +116,7 @@ impl Plot {
         let edges = self
             .bands
             .iter()
-            .flat_map(|(_, b)| b.iter().flat_map(|p| [(p.0, p.1), (p.0, p.2)]));
+            .flat_map(|band| band.points.iter().flat_map(|p| [(p.0, p.1), (p.0, p.2)]));
         let mut ranges = [(f64::INFINITY, f64::NEG_INFINITY); 2];
         for (x, y) in curves.chain(edges).filter(|(x, y)| self.usable(*x, *y)) {
             for (range, value) in ranges.iter_mut().zip([x, y]) {
@@ -160,8 +171,8 @@ impl Plot {
     {
         let mut chart = ChartBuilder::on(root)
             .margin(12)
-            .x_label_area_size(44)
-            .y_label_area_size(64)
+            .x_label_area_size(50)
+            .y_label_area_size(72)
             .build_cartesian_2d(x, y)?;
         chart
             .configure_mesh()
@@ -172,13 +183,14 @@ impl Plot {
             .y_desc(self.y_label.as_str())
             .x_labels(7)
             .y_labels(7)
-            .label_style((FONT, 13).into_font().color(&INK))
-            .axis_desc_style((FONT, 14).into_font().color(&INK))
+            .label_style((FONT, 15).into_font().color(&INK))
+            .axis_desc_style((FONT, 16).into_font().color(&INK))
             .x_label_formatter(&|v| tick(*v))
             .y_label_formatter(&|v| tick(*v))
             .draw()?;
-        for (colour, band) in &self.bands {
+        for band in &self.bands {
             let usable: Vec<_> = band
+                .points
                 .iter()
                 .filter(|p| self.usable(p.0, p.1) && self.usable(p.0, p.2))
                 .collect();
@@ -186,7 +198,7 @@ impl Plot {
             outline.extend(usable.iter().rev().map(|p| (p.0, p.2)));
             chart.draw_series(std::iter::once(Polygon::new(
                 outline,
-                PALETTE[colour % PALETTE.len()].mix(0.18).filled(),
+                PALETTE[band.colour % PALETTE.len()].mix(0.18).filled(),
             )))?;
         }
         for series in &self.series {
@@ -201,6 +213,11 @@ impl Plot {
             let entry = match series.mark {
                 Mark::Line => chart.draw_series(LineSeries::new(points, stroke))?,
                 Mark::Dashes => chart.draw_series(DashedLineSeries::new(points, 7, 5, stroke))?,
+                Mark::Rings => chart.draw_series(
+                    points
+                        .into_iter()
+                        .map(|p| Circle::new(p, 7, INK.stroke_width(2))),
+                )?,
                 Mark::Dots => {
                     for ((x, y), error) in series.points.iter().zip(&series.errors) {
                         let bar = vec![(*x, y - error), (*x, y + error)];
@@ -228,8 +245,9 @@ impl Plot {
                 .configure_series_labels()
                 .position(self.free_corner())
                 .margin(10)
+                .background_style(WHITE.mix(0.8))
                 .label_font(
-                    (FONT, 13)
+                    (FONT, 15)
                         .into_font()
                         .color(&INK)
                         .pos(Pos::new(HPos::Left, VPos::Center)),
@@ -289,6 +307,7 @@ fn legend<'a>(
             plotters::element::DashedPathElement::new(ends, 7, 5, stroke).into_dyn()
         }
         Mark::Dots => Circle::new((x + 10, y), 3, colour.filled()).into_dyn(),
+        Mark::Rings => Circle::new((x + 10, y), 6, INK.stroke_width(2)).into_dyn(),
     }
 }
 
@@ -383,10 +402,10 @@ mod tests {
                 .with("a", Mark::Line, 0, points.clone())
                 .with("b", Mark::Dots, 1, points.clone())
                 .with_errors(vec![0.5; 49]);
-            plot.bands.push((
-                0,
-                points.iter().map(|p| (p.0, 0.9 * p.1, 1.1 * p.1)).collect(),
-            ));
+            plot.bands.push(Band {
+                colour: 0,
+                points: points.iter().map(|p| (p.0, 0.9 * p.1, 1.1 * p.1)).collect(),
+            });
             (plot.x_log, plot.y_log) = (log, log);
             let svg = plot.svg(600, 400);
             assert!(svg.starts_with("<svg") && svg.contains("polygon") && svg.contains("circle"));

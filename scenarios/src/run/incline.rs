@@ -344,15 +344,18 @@ pub fn energy_table(series: &[SeriesPoint]) -> Table {
         .with("mean_height", "m", column(|p| p.mean_height))
 }
 
+/// Values and their standard errors.
+type Pair = (Vec<f64>, Vec<f64>);
+
 /// Averages through the depth, with their standard errors behind them.
 pub fn profile_table(name: &str, profile: &Profile) -> Table {
     let rows = &profile.rows;
-    let values = |f: &dyn Fn(&ProfileRow) -> Option<Estimate>| -> (Vec<f64>, Vec<f64>) {
+    let values = |f: &dyn Fn(&ProfileRow) -> Option<Estimate>| -> Pair {
         rows.iter()
             .map(|row| f(row).map_or((f64::NAN, f64::NAN), |e| (e.value, e.error)))
             .unzip()
     };
-    let columns: [(&str, &str, (Vec<f64>, Vec<f64>)); 9] = [
+    let columns: [(&str, &str, Pair); 9] = [
         ("phi", "1", values(&|r| Some(r.phi))),
         ("u", "m/s", values(&|r| Some(r.u))),
         ("p", "Pa", values(&|r| Some(r.p))),
