@@ -1,6 +1,8 @@
 //! Calibration: a campaign of inclined-plane runs, the μ(I) law fitted to it, and the continuum
 //! with that law beside the grains.
 
+mod findings;
+
 use crate::cost::Cost;
 use crate::failure::Failure;
 use crate::interruption;
@@ -10,15 +12,12 @@ use crate::rheology_file::{FitRow, Provenance, RheologyFile};
 use crate::run::{self, RunOptions, bagnold, incline};
 use crate::run_directory::RunDirectory;
 use crate::scene::{InclineScene, Scene, SceneBody};
-use crate::state_hash;
-use crate::summary::{Quantity, Status, Summary};
-use crate::table::Table;
+use crate::summary::{Status, Summary};
 use colluvium_coupling::calibration::MuIFit;
-use colluvium_coupling::calibration::thesis::{Estimator, published_row};
 use colluvium_coupling::campaign::{
     Bracket, CampaignError, CampaignEvent, CampaignResult, CampaignSpec, GuessedLaw, run_campaign,
 };
-use colluvium_coupling::incline::{InclineResult, Outcome, Purpose, Start};
+use colluvium_coupling::incline::{InclineResult, Purpose};
 use colluvium_dem::Threads;
 use colluvium_dem::preparation::Bed;
 use std::collections::BTreeMap;
@@ -262,11 +261,11 @@ fn campaign(
     let text = serde_json::to_vec(&record).map_err(|error| Failure::Run(error.to_string()))?;
     directory.write(CAMPAIGN, &text)?;
 
-    let mut summary = summarise(scene, &record);
+    let mut summary = findings::summarise(scene, &record);
     summary.model = incline::model(body, &bed);
     let grain_steps = record.result.cost.grain_steps + bed.report.grain_steps;
     summary.cost = Cost::measured(dem_wall, threads, grain_steps, 0);
-    let tables = tables(&record);
+    let tables = findings::tables(&record);
     run::finish(
         scene,
         directory,
@@ -391,167 +390,4 @@ fn layer_settings(body: &InclineScene, fit: &MuIFit, angle: f64, depth: f64) -> 
         real("rheology.grain_density", body.grains.density),
         format!("grid.cells={}", body.calibration.compare_cells),
     ]
-}
-
-fn summarise(scene: &Scene, record: &Campaign) -> Summary {
-    let result = &record.result;
-    let mut summary = Summary::begun(&scene.name, "calibrate");
-    let published =
-        published_material(&scene.name).and_then(|m| published_row(m, Estimator::Top, true));
-    let source = "thesis Table 2.6, top, with Φ";
-    if let Some(fit) = &result.fit {
-        let rows = [
-            (
-                "mu_s",
-                fit.mu_s,
-                fit.mu_s_error,
-                published.map(|r| r.mu_s[0]),
-            ),
-            (
-                "mu_2",
-                fit.mu_2,
-                fit.mu_2_error,
-                published.map(|r| r.mu_2[0]),
-            ),
-            ("i_0", fit.i_0, fit.i_0_error, published.map(|r| r.i_0[0])),
-        ];
-        for (name, value, error, reference) in rows {
-            let quantity = Quantity::new(value, "1").with_error(error);
-            summary.put(
-                name,
-                match reference {
-                    Some(reference) => quantity.against(reference, source),
-                    None => quantity.from("fit of |τ|/p, p = trace/3"),
-                },
-            );
-        }
-        summary.put(
-            "solid_fraction",
-            Quantity::new(fit.solid_fraction, "1").with_error(fit.solid_fraction_error),
-        );
-        summary.put("valid_i_low", Quantity::new(fit.valid_i[0], "1"));
-        summary.put("valid_i_high", Quantity::new(fit.valid_i[1], "1"));
-        if let Some(peer) = record.peer(&scene.name) {
-            let (mu, error) = fit.band(peer.inertial_number);
-            summary.put(
-                "friction_at_peer_i",
-                Quantity::new(mu, "1")
-                    .with_error(error)
-                    .against(peer.friction, peer.source),
-            );
-            if let Some(law) = &fit.solid_fraction_of_i {
-                summary.put(
-                    "solid_fraction_at_peer_i",
-                    Quantity::new(law.intercept - law.slope * peer.inertial_number, "1")
-                        .against(peer.solid_fraction, peer.source),
-                );
-            }
-        }
-    }
-    if let Some(fit) = &result.fit_zz {
-        for (name, value, error) in [
-            ("mu_s_zz", fit.mu_s, fit.mu_s_error),
-            ("mu_2_zz", fit.mu_2, fit.mu_2_error),
-            ("i_0_zz", fit.i_0, fit.i_0_error),
-        ] {
-            summary.put(
-                name,
-                Quantity::new(value, "1")
-                    .with_error(error)
-                    .from("fit of |τ|/σ_zz"),
-            );
-        }
-    }
-    for (name, bracket) in [
-        ("stop", result.stop_bracket_degrees),
-        ("onset", result.onset_bracket_degrees),
-    ] {
-        if let Some((low, high)) = bracket {
-            summary.put(
-                &format!("{name}_low"),
-                Quantity::new(low, "degree").from("highest at rest"),
-            );
-            summary.put(
-                &format!("{name}_high"),
-                Quantity::new(high, "degree").from("lowest that flows"),
-            );
-        }
-    }
-    let good = f64::from(u8::from(result.verdict.good));
-    summary.put(
-        "good",
-        Quantity::new(good, "1").from("1 = fit to feed a continuum within valid_i"),
-    );
-    summary.remarks.push(result.verdict.text.clone());
-    for c in record.comparisons.iter().filter(|c| !c.inside_valid_i) {
-        summary.remarks.push(format!(
-            "Continuum at {} degrees: I = {:.4} lies outside the measured range.",
-            c.slope_degrees, c.inertial_number
-        ));
-    }
-    let checks = result.runs.iter().filter_map(|r| r.checks);
-    summary.ledger.mass_relative = checks
-        .clone()
-        .map(|c| c.mass_relative.abs())
-        .fold(0.0, f64::max);
-    summary.ledger.momentum_relative = checks.map(|c| c.normal_relative.abs()).reduce(f64::max);
-    summary.state_hash = state_hash::of_hashes(result.runs.iter().map(|r| r.state_hash.as_str()));
-    summary
-}
-
-fn tables(record: &Campaign) -> Vec<Table> {
-    let runs = &record.result.runs;
-    let column = |f: &dyn Fn(&InclineResult) -> f64| runs.iter().map(f).collect();
-    let flag = |yes: bool| f64::from(u8::from(yes));
-    let angles = Table::new("angles")
-        .with("slope_degrees", "degree", column(&|r| r.slope_degrees))
-        .with(
-            "from_rest",
-            "1",
-            column(&|r| flag(matches!(r.start, Start::Rest))),
-        )
-        .with("flows", "1", column(&|r| flag(r.flows())))
-        .with(
-            "steady",
-            "1",
-            column(&|r| flag(r.outcome == Outcome::Steady)),
-        )
-        .with("mean_velocity", "m/s", column(&|r| r.steady.mean))
-        .with(
-            "mean_velocity_error",
-            "m/s",
-            column(&|r| r.steady.mean_error),
-        )
-        .with("height", "m", column(&|r| r.height))
-        .with("distance", "m", column(&|r| r.distance))
-        .with("largest_overlap", "R", column(&|r| r.largest_overlap))
-        .with("grain_steps", "1", column(&|r| r.cost.grain_steps as f64))
-        .with("wall_s", "s", column(&|r| r.cost.wall_s));
-    let mut tables = vec![angles, incline::points_table(runs)];
-    let rows: Vec<(&Comparison, usize)> = record
-        .comparisons
-        .iter()
-        .flat_map(|c| (0..c.z.len()).map(move |k| (c, k)))
-        .collect();
-    let of = |f: &dyn Fn(&Comparison, usize) -> f64| rows.iter().map(|(c, k)| f(c, *k)).collect();
-    tables.push(
-        Table::new("continuum")
-            .with("slope_degrees", "degree", of(&|c, _| c.slope_degrees))
-            .with(
-                "friction_zz",
-                "1",
-                of(&|c, _| flag(c.friction == FrictionOf::NormalStress)),
-            )
-            .with("z", "m", of(&|c, k| c.z[k]))
-            .with("u", "m/s", of(&|c, k| c.u[k]))
-            .with("p", "Pa", of(&|c, k| c.p[k]))
-            .with("u_exact", "m/s", of(&|c, k| c.exact_u[k])),
-    );
-    for run in runs.iter().filter(|r| r.purpose == Purpose::Measure) {
-        if let Some(profile) = &run.profile {
-            let name = format!("profile_{}", run.slope_degrees);
-            tables.push(incline::profile_table(&name, profile));
-        }
-    }
-    tables
 }

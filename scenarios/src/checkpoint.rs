@@ -14,7 +14,7 @@ pub struct Checkpoint {
     pub record: Record,
     /// Which part of the work the state belongs to, as in `bed` or `flow`.
     pub stage: String,
-    /// Wall time spent so far [s].
+    /// Wall time spent so far (s).
     pub wall_s: f64,
 }
 

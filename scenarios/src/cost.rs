@@ -5,7 +5,7 @@ use serde::{Deserialize, Serialize};
 /// Cost of a run; rates are per second of wall time.
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Cost {
-    /// Wall time [s], all parts of a resumed run together.
+    /// Wall time (s), all parts of a resumed run together.
     pub wall_s: f64,
     /// Threads.
     pub threads: usize,

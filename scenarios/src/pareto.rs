@@ -30,7 +30,7 @@ pub struct Row {
     pub error: f64,
     /// Observed order between this and the run before.
     pub order: Option<f64>,
-    /// Wall time [s].
+    /// Wall time (s).
     pub wall_s: f64,
     /// Grain-steps and cell-steps.
     pub steps: u64,

@@ -35,14 +35,14 @@ pub struct RheologyFile {
     /// Its standard error.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub i_0_error: Option<f64>,
-    /// Grain diameter [m].
+    /// Grain diameter (m).
     pub diameter: f64,
     /// Solid volume fraction in the flow.
     pub solid_fraction: f64,
     /// Its standard error.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub solid_fraction_error: Option<f64>,
-    /// Density of the grains [kg/m³].
+    /// Density of the grains (kg/m³).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grain_density: Option<f64>,
     /// Inertial numbers between which the law was measured.
@@ -83,7 +83,7 @@ pub struct Provenance {
     pub version: String,
     /// The scene.
     pub scene: String,
-    /// Angles of the runs the fit uses [degrees].
+    /// Angles of the runs the fit uses (degrees).
     pub flow_degrees: Vec<f64>,
     /// Seed of the bed.
     pub seed: u64,

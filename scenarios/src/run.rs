@@ -58,7 +58,7 @@ pub struct Under<'a> {
 }
 
 impl Under<'_> {
-    /// Wall time, parts before a restart included [s].
+    /// Wall time, parts before a restart included (s).
     pub fn wall_s(&self) -> f64 {
         self.wall_before + self.start.elapsed().as_secs_f64()
     }

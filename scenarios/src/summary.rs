@@ -56,7 +56,7 @@ pub struct Model {
     pub grains: u64,
     /// Cells.
     pub cells: u64,
-    /// Time step [s].
+    /// Time step (s).
     pub dt_s: f64,
     /// What limits the time step.
     pub dt_limit: String,
@@ -73,7 +73,7 @@ pub struct Ledger {
     pub momentum_relative: Option<f64>,
     /// Angular momentum: the same.
     pub angular_momentum_relative: Option<f64>,
-    /// Energies [J], by name.
+    /// Energies (J), by name.
     pub energy: BTreeMap<String, f64>,
 }
 

@@ -1,11 +1,13 @@
 //! The report of a calibration.
 
+mod continuum;
+mod thesis;
+
 use super::page::{figure, number, with_error};
 use super::plot::{Band, Mark, Plot};
 use super::{Record, results};
-use crate::calibrate::{CAMPAIGN, published_material};
+use crate::calibrate::CAMPAIGN;
 use colluvium_coupling::calibration::MuIFit;
-use colluvium_coupling::calibration::thesis::{Estimator, Row, TABLE_2_6};
 use colluvium_coupling::campaign::CampaignResult;
 use colluvium_coupling::incline::{InclineResult, Outcome, Purpose, Start};
 use maud::{Markup, html};
@@ -22,9 +24,9 @@ pub struct Campaign {
     pub result: CampaignResult,
     /// The continuum beside the grains.
     pub comparisons: Vec<Comparison>,
-    /// Gravity [m/s²].
+    /// Gravity (m/s²).
     pub gravity: f64,
-    /// Mean diameter [m].
+    /// Mean diameter (m).
     pub diameter: f64,
 }
 
@@ -41,7 +43,7 @@ pub enum FrictionOf {
 /// A continuum layer at the slope and depth of one flow of grains.
 #[derive(Clone, Debug, Serialize, Deserialize)]
 pub struct Comparison {
-    /// Slope [degrees].
+    /// Slope (degrees).
     pub slope_degrees: f64,
     /// Which fit it was given.
     pub friction: FrictionOf,
@@ -51,15 +53,15 @@ pub struct Comparison {
     pub inside_valid_i: bool,
     /// Relative L2 error against the exact profile of the same law.
     pub velocity_error: f64,
-    /// Wall time [s].
+    /// Wall time (s).
     pub wall_s: f64,
-    /// Heights [m].
+    /// Heights (m).
     pub z: Vec<f64>,
-    /// Velocity [m/s].
+    /// Velocity (m/s).
     pub u: Vec<f64>,
-    /// Pressure [Pa].
+    /// Pressure (Pa).
     pub p: Vec<f64>,
-    /// Exact velocity [m/s].
+    /// Exact velocity (m/s).
     pub exact_u: Vec<f64>,
 }
 
@@ -120,8 +122,8 @@ pub fn sections(record: &Record, campaign: &Campaign) -> Markup {
         (law(record, campaign))
         (angles(campaign))
         (profiles(campaign))
-        (continuum(campaign))
-        (thesis(record, campaign))
+        (continuum::continuum(campaign))
+        (thesis::thesis(record, campaign))
         (results(&record.summary))
     }
 }
@@ -426,200 +428,4 @@ fn profiles(campaign: &Campaign) -> Markup {
             (figure(&friction.svg(WIDTH, HEIGHT), "Friction: uniform in theory."))
         }
     }
-}
-
-fn continuum(campaign: &Campaign) -> Markup {
-    let flows: Vec<&InclineResult> = campaign
-        .flows()
-        .filter(|r| {
-            campaign
-                .comparisons
-                .iter()
-                .any(|c| c.slope_degrees == r.slope_degrees)
-        })
-        .collect();
-    html! {
-        @if !flows.is_empty() {
-            h2 { "Grains, continuum, theory" }
-            p {
-                "The fitted law in the finite-volume solver, at the slope and depth of the grains, from rest to steady flow. "
-                "On an incline its single pressure is σ_zz and its friction is tan θ; the grains' p = trace/3 is smaller than σ_zz. "
-                "So the fit of |τ|/σ_zz is the one that should reproduce the velocity here, and the gap to the fit of |τ|/p "
-                "shows what the normal-stress difference costs a scalar law."
-            }
-            div.figures {
-                @for run in &flows { (velocity(campaign, run)) (pressure(campaign, run)) }
-            }
-            div.wide { table {
-                tr {
-                    th { "slope" } th.text { "law" } th { "I" } th { "mean u [m/s]" } th { "grains' mean u [m/s]" }
-                    th { "difference" } th { "error against exact" } th { "wall [s]" }
-                }
-                @for c in &campaign.comparisons {
-                    @let grains = flows.iter().find(|r| r.slope_degrees == c.slope_degrees).map(|r| r.steady.mean);
-                    @let mean = c.u.iter().sum::<f64>() / c.u.len().max(1) as f64;
-                    tr {
-                        td { (c.slope_degrees) "°" }
-                        td.text { (friction_name(c.friction)) }
-                        td { (number(c.inertial_number)) @if !c.inside_valid_i { " " span.tag.bad { "not measured" } } }
-                        td { (number(mean)) }
-                        td { @if let Some(g) = grains { (number(g)) } }
-                        td { @if let Some(g) = grains { (format!("{:+.1} %", 100.0 * (mean / g - 1.0))) } }
-                        td { (number(c.velocity_error)) }
-                        td { (number(c.wall_s)) }
-                    }
-                }
-            } }
-        }
-    }
-}
-
-fn friction_name(friction: FrictionOf) -> &'static str {
-    match friction {
-        FrictionOf::Pressure => "|τ|/p",
-        FrictionOf::NormalStress => "|τ|/σ_zz",
-    }
-}
-
-fn velocity(campaign: &Campaign, run: &InclineResult) -> Markup {
-    let Some(profile) = &run.profile else {
-        return html! {};
-    };
-    let grains = profile
-        .rows
-        .iter()
-        .filter(|r| r.z > 0.0 && r.z < run.height);
-    let mut plot = Plot::new("velocity u [m/s]", "height z [m]").with(
-        "grains",
-        Mark::Dots,
-        0,
-        grains.map(|r| (r.u.value, r.z)).collect(),
-    );
-    for c in campaign
-        .comparisons
-        .iter()
-        .filter(|c| c.slope_degrees == run.slope_degrees)
-    {
-        let colour = if c.friction == FrictionOf::Pressure {
-            1
-        } else {
-            2
-        };
-        let label = format!("continuum, {}", friction_name(c.friction));
-        plot = plot
-            .with(
-                &label,
-                Mark::Line,
-                colour,
-                c.u.iter().copied().zip(c.z.iter().copied()).collect(),
-            )
-            .with(
-                "",
-                Mark::Dashes,
-                6,
-                c.exact_u.iter().copied().zip(c.z.iter().copied()).collect(),
-            );
-    }
-    if let Some(last) = plot.series.last_mut() {
-        last.label = "exact Bagnold".into();
-    }
-    let text = format!(
-        "Velocity at {}°; {}.",
-        run.slope_degrees,
-        outcome(run.outcome)
-    );
-    figure(&plot.svg(WIDTH, HEIGHT), &text)
-}
-
-fn pressure(campaign: &Campaign, run: &InclineResult) -> Markup {
-    let Some(profile) = &run.profile else {
-        return html! {};
-    };
-    let rows: Vec<_> = profile
-        .rows
-        .iter()
-        .filter(|r| r.z > 0.0 && r.z < run.height)
-        .collect();
-    let mut plot = Plot::new("pressure [Pa]", "height z [m]")
-        .with(
-            "grains, σ_zz",
-            Mark::Dots,
-            0,
-            rows.iter().map(|r| (r.sigma_zz.value, r.z)).collect(),
-        )
-        .with(
-            "grains, trace/3",
-            Mark::Dots,
-            3,
-            rows.iter().map(|r| (r.p.value, r.z)).collect(),
-        );
-    if let Some(c) = campaign
-        .comparisons
-        .iter()
-        .find(|c| c.slope_degrees == run.slope_degrees)
-    {
-        plot = plot.with(
-            "continuum",
-            Mark::Line,
-            1,
-            c.p.iter().copied().zip(c.z.iter().copied()).collect(),
-        );
-    }
-    figure(
-        &plot.svg(WIDTH, HEIGHT),
-        &format!("Pressure at {}°.", run.slope_degrees),
-    )
-}
-
-fn thesis(record: &Record, campaign: &Campaign) -> Markup {
-    let Some(material) = published_material(&record.summary.scene) else {
-        return html! {};
-    };
-    let name = |e: Estimator| match e {
-        Estimator::Top => "top",
-        Estimator::Mean => "mean",
-        Estimator::MinimalResidual => "min(res)",
-    };
-    html! {
-        h2 { "The thesis' Table 2.6 beside ours" }
-        p {
-            "F. Thuillet (2019) takes stress from the weight and I from the velocity; the rows below do the same with our flows. "
-            "Differences are in joint standard errors. Its layer depth, box, stiffness and time step are not printed; ours are in the scene."
-        }
-        div.wide { table {
-            tr { th { "estimator" } th { "" } th { "μ_s" } th { "μ_2" } th { "I_0" } }
-            @for fit in &campaign.result.estimators {
-                @let published = TABLE_2_6.iter().find(|r| r.material == material && r.estimator == fit.estimator && r.with_phi == fit.with_phi).map(|r| r.row);
-                @let label = format!("{}{}", name(fit.estimator), if fit.with_phi { ", with Φ" } else { "" });
-                tr.ours {
-                    td { (label) } td.text { "ours" }
-                    @match (&fit.row, &fit.failure) {
-                        (Some(row), _) => (cells(row)),
-                        (None, Some(why)) => td.text.wrap colspan="3" { (why) },
-                        (None, None) => td colspan="3" { "–" },
-                    }
-                }
-                @if let Some(theirs) = published {
-                    tr { td { } td.text { "thesis" } (cells(&theirs)) }
-                    @if let Some(ours) = &fit.row {
-                        tr { td { } td.text { "difference" } @for d in ours.differences(&theirs) { td { (format!("{d:+.1} σ")) } } }
-                    }
-                }
-            }
-        } }
-        @if let (Some(fit), Some(theirs)) = (&campaign.result.fit, TABLE_2_6.iter().find(|r| r.material == material && r.estimator == Estimator::Top && r.with_phi)) {
-            @let ours = Row { mu_s: [fit.mu_s, fit.mu_s_error], mu_2: [fit.mu_2, fit.mu_2_error], i_0: [fit.i_0, fit.i_0_error] };
-            h3 { "The measured-stress fit against “top, with Φ”" }
-            table {
-                tr { th { "" } th { "μ_s" } th { "μ_2" } th { "I_0" } }
-                tr.ours { td { "ours, |τ|/p" } (cells(&ours)) }
-                tr { td { "thesis" } (cells(&theirs.row)) }
-                tr { td { "difference" } @for d in ours.differences(&theirs.row) { td { (format!("{d:+.1} σ")) } } }
-            }
-        }
-    }
-}
-
-fn cells(row: &Row) -> Markup {
-    html! { @for [value, error] in [row.mu_s, row.mu_2, row.i_0] { td { (with_error(value, error)) } } }
 }

@@ -65,7 +65,7 @@ pub fn options(scene: &BagnoldScene) -> Options {
     }
 }
 
-/// Computes the flow; also gives the wall time [s].
+/// Computes the flow; also gives the wall time (s).
 pub fn solve(
     scene: &BagnoldScene,
     progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,

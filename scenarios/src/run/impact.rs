@@ -30,11 +30,11 @@ const STEPS_PER_LOOK: u64 = 20_000;
 pub struct Impact {
     /// The simulation's start.
     pub setup: Setup,
-    /// m_1 m_2/(m_1 + m_2), or the sphere's mass against a plane [kg].
+    /// m_1 m_2/(m_1 + m_2), or the sphere's mass against a plane (kg).
     pub reduced_mass: f64,
-    /// √(m_red (π² + ln² ε_n)/k_n) [s].
+    /// √(m_red (π² + ln² ε_n)/k_n) (s).
     pub contact_time: f64,
-    /// Duration [s].
+    /// Duration (s).
     pub duration: f64,
 }
 

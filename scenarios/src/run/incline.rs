@@ -60,7 +60,7 @@ pub fn law(scene: &InclineScene) -> ContactLaw {
     }
 }
 
-/// The time step of a scene [s].
+/// The time step of a scene (s).
 pub fn step(scene: &InclineScene) -> f64 {
     timestep::step(
         scene.mean_mass(),

@@ -8,13 +8,13 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BagnoldScene {
-    /// Inclination to the horizontal [degrees].
+    /// Inclination to the horizontal (degrees).
     #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 90.0))]
     pub slope_degrees: f64,
-    /// Depth of the layer, normal to the plane [m].
+    /// Depth of the layer, normal to the plane (m).
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e5))]
     pub depth: f64,
-    /// Gravity [m/s²].
+    /// Gravity (m/s²).
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
     pub gravity: f64,
     /// Size of the run: cells across the depth grow with it.
@@ -44,16 +44,16 @@ pub struct RheologyKeys {
     /// Inertial number I_0 half way between.
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
     pub i_0: f64,
-    /// Grain diameter d [m].
+    /// Grain diameter d (m).
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0))]
     pub diameter: f64,
     /// Solid volume fraction φ.
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0))]
     pub solid_fraction: f64,
-    /// Density of the grains ρ_s [kg/m³].
+    /// Density of the grains ρ_s (kg/m³).
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 30000.0))]
     pub grain_density: f64,
-    /// Cohesion c [Pa].
+    /// Cohesion c (Pa).
     #[serde(default)]
     #[schemars(extend("minimum" = 0.0, "maximum" = 1.0e9))]
     pub cohesion: f64,

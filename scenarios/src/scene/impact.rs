@@ -8,19 +8,19 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ImpactScene {
-    /// Speed of approach [m/s].
+    /// Speed of approach (m/s).
     #[schemars(extend("minimum" = 0.0, "maximum" = 1.0e4))]
     pub speed: f64,
-    /// Angle between the velocity and the normal of the contact [degrees].
+    /// Angle between the velocity and the normal of the contact (degrees).
     #[schemars(extend("minimum" = 0.0, "maximum" = 90.0))]
     pub impact_degrees: f64,
-    /// Spin of the moving sphere about y, normal to the plane of the impact [rad/s].
+    /// Spin of the moving sphere about y, normal to the plane of the impact (rad/s).
     #[schemars(extend("minimum" = -1.0e6, "maximum" = 1.0e6))]
     pub spin: f64,
-    /// Radius [m].
+    /// Radius (m).
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 100.0))]
     pub radius: f64,
-    /// Density [kg/m³].
+    /// Density (kg/m³).
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 30000.0))]
     pub density: f64,
     /// Normal restitution ε_n.
@@ -32,19 +32,19 @@ pub struct ImpactScene {
     /// ε_t: sets the tangential dashpot as ε_n sets the normal one; 1 = none.
     #[schemars(extend("minimum" = 0.01, "maximum" = 1.0))]
     pub tangential_restitution: f64,
-    /// Normal stiffness k_n [N/m].
+    /// Normal stiffness k_n (N/m).
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e12))]
     pub stiffness: f64,
     /// Tangential over normal stiffness.
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 2.0))]
     pub stiffness_ratio: f64,
-    /// Gap between the surfaces at the start [m]; negative where they start pressed together.
+    /// Gap between the surfaces at the start (m); negative where they start pressed together.
     #[schemars(extend("minimum" = -1.0, "maximum" = 100.0))]
     pub gap: f64,
-    /// Gravity along -z [m/s²].
+    /// Gravity along -z (m/s²).
     #[schemars(extend("minimum" = 0.0, "maximum" = 1000.0))]
     pub gravity: f64,
-    /// Duration [s]; 0 ends one contact time after the spheres have parted.
+    /// Duration (s); 0 ends one contact time after the spheres have parted.
     #[schemars(extend("minimum" = 0.0, "maximum" = 1.0e4))]
     pub duration: f64,
     /// Steps per undamped contact.
@@ -74,7 +74,7 @@ pub struct RollingKeys {
 }
 
 impl ImpactScene {
-    /// Mass of one sphere [kg].
+    /// Mass of one sphere (kg).
     pub fn mass(&self) -> f64 {
         self.density * 4.0 / 3.0 * std::f64::consts::PI * self.radius.powi(3)
     }

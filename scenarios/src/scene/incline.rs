@@ -8,7 +8,7 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InclineScene {
-    /// Inclination of the plane to the horizontal [degrees].
+    /// Inclination of the plane to the horizontal (degrees).
     #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 90.0))]
     pub slope_degrees: f64,
     /// Size of the run: both edges of the floor grow with it, grains with its square; depth stays.
@@ -22,7 +22,7 @@ pub struct InclineScene {
     /// Seed of the random numbers that draw the bed.
     #[schemars(extend("minimum" = 0, "maximum" = 9007199254740991_i64))]
     pub seed: u64,
-    /// Gravity [m/s²].
+    /// Gravity (m/s²).
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
     pub gravity: f64,
     /// The grains.
@@ -53,10 +53,10 @@ pub enum InclineStart {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct GrainKeys {
-    /// Mean diameter d [m].
+    /// Mean diameter d (m).
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0))]
     pub diameter: f64,
-    /// Density of the grains' material [kg/m³].
+    /// Density of the grains' material (kg/m³).
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 30000.0))]
     pub density: f64,
     /// Law of sizes.
@@ -102,11 +102,11 @@ pub struct ContactKeys {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 100.0, "maximum" = 1.0e10))]
     pub stiffness_scaled: Option<f64>,
-    /// Normal stiffness k_n [N/m].
+    /// Normal stiffness k_n (N/m).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e12))]
     pub stiffness: Option<f64>,
-    /// Normal stiffness from the largest speed expected [m/s], so that it gives an overlap of 1 %
+    /// Normal stiffness from the largest speed expected (m/s), so that it gives an overlap of 1 %
     /// of the smallest radius: k_n = m (v/x)².
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e4))]
@@ -141,16 +141,16 @@ pub struct TimestepKeys {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TimeKeys {
-    /// Time before the first test for a steady state [s].
+    /// Time before the first test for a steady state (s).
     #[schemars(extend("minimum" = 0.0, "maximum" = 1.0e6))]
     pub relax: f64,
-    /// Time over which profiles are averaged [s].
+    /// Time over which profiles are averaged (s).
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
     pub average: f64,
-    /// Longest time that is simulated [s].
+    /// Longest time that is simulated (s).
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e7))]
     pub limit: f64,
-    /// Time between two samples of the averages [s].
+    /// Time between two samples of the averages (s).
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e4))]
     pub sample_every: f64,
     /// Thickness of the averaging layers, in diameters.
@@ -165,14 +165,14 @@ pub struct TimeKeys {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CalibrationKeys {
-    /// Angles run from flow to measure μ(I) [degrees].
+    /// Angles run from flow to measure μ(I) (degrees).
     #[schemars(extend("minItems" = 1, "maxItems" = 60, "items" = {"type": "number", "minimum": 0.0, "exclusiveMaximum": 90.0}))]
     pub flow_degrees: Vec<f64>,
     /// Where a flowing bed stops, bracketed from flow.
     pub stop: Bracket,
     /// Where a bed at rest starts to flow, bracketed from rest.
     pub onset: Bracket,
-    /// Longest run of those two searches [s].
+    /// Longest run of those two searches (s).
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
     pub search_time: f64,
     /// Inertial number that the search for the stop starts from.
@@ -183,7 +183,7 @@ pub struct CalibrationKeys {
     pub usable_drift: f64,
     /// The law that starting velocities are taken from.
     pub guess: GuessKeys,
-    /// Angle at which the continuum is compared with the grains [degrees].
+    /// Angle at which the continuum is compared with the grains (degrees).
     #[schemars(extend("minItems" = 0, "maxItems" = 60, "items" = {"type": "number", "minimum": 0.0, "exclusiveMaximum": 90.0}))]
     pub compare_degrees: Vec<f64>,
     /// Cells across the depth in that comparison.
@@ -211,19 +211,19 @@ pub struct GuessKeys {
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct Bracket {
-    /// An angle at which it rests [degrees].
+    /// An angle at which it rests (degrees).
     #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 90.0))]
     pub low: f64,
-    /// An angle at which it flows [degrees].
+    /// An angle at which it flows (degrees).
     #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 90.0))]
     pub high: f64,
-    /// Width at which halving ends [degrees].
+    /// Width at which halving ends (degrees).
     #[schemars(extend("minimum" = 0.05, "maximum" = 90.0))]
     pub resolution: f64,
 }
 
 impl InclineScene {
-    /// Normal stiffness k_n [N/m], from whichever of the three keys is given.
+    /// Normal stiffness k_n (N/m), from whichever of the three keys is given.
     pub fn stiffness(&self) -> f64 {
         let contact = &self.contact;
         let mass = self.mean_mass();
@@ -239,12 +239,12 @@ impl InclineScene {
         }
     }
 
-    /// Mass of a grain of mean diameter [kg].
+    /// Mass of a grain of mean diameter (kg).
     pub fn mean_mass(&self) -> f64 {
         self.grains.density * std::f64::consts::PI / 6.0 * self.grains.diameter.powi(3)
     }
 
-    /// Radius of the smallest grain that the size law allows [m].
+    /// Radius of the smallest grain that the size law allows (m).
     pub fn smallest_radius(&self) -> f64 {
         let cut = match self.grains.sizes {
             SizeLaw::Gaussian => self.grains.cut,
@@ -258,7 +258,7 @@ impl InclineScene {
         (self.grains.count as f64 * self.scale * self.scale).round() as usize
     }
 
-    /// Edges of the floor at this scale [m].
+    /// Edges of the floor at this scale (m).
     pub fn floor_edges(&self) -> [f64; 2] {
         [self.floor.length_diameters, self.floor.width_diameters]
             .map(|n| n * self.grains.diameter * self.scale)
