@@ -96,6 +96,7 @@ impl Comparison {
         let mut summary = Summary::begun(&self.scene.name, "pareto");
         summary.status = Status::Done;
         summary.cost.wall_s = rows.iter().map(|r| r.wall_s).sum();
+        summary.cost.threads = threads.unwrap_or_else(rayon::current_num_threads);
         summary.cost.peak_memory_bytes = crate::cost::peak_memory_bytes();
         summary
             .remarks

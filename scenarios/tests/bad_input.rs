@@ -72,7 +72,7 @@ const CASES: &[(&[&str], &[&str])] = &[
     ),
     (
         &["run", "incline-moderate", "--set", "time.limit=0.1"],
-        &["time.limit", "0.1", "1.76"],
+        &["time.limit", "0.1", "2.56"],
     ),
     (
         &[

@@ -83,6 +83,8 @@ pub fn number(value: f64) -> String {
     let size = value.abs();
     if value == 0.0 {
         "0".to_owned()
+    } else if value.fract() == 0.0 && size < 1e6 {
+        format!("{value:.0}")
     } else if !(1e-3..1e6).contains(&size) {
         format!("{value:.3e}")
     } else {
