@@ -9,27 +9,27 @@ use serde::{Deserialize, Serialize};
 /// leave them and are still found.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Domain {
-    /// Lower corner [m].
+    /// Lower corner (m).
     pub lower: Vector3<f64>,
-    /// Upper corner [m].
+    /// Upper corner (m).
     pub upper: Vector3<f64>,
     /// Which axes wrap around.
     pub periodic: [bool; 3],
 }
 
 impl Domain {
-    /// Edge lengths [m].
+    /// Edge lengths (m).
     pub fn lengths(&self) -> Vector3<f64> {
         self.upper - self.lower
     }
 
-    /// Area of the floor, `L_x L_y` [m²].
+    /// Area of the floor, `L_x L_y` (m²).
     pub fn floor_area(&self) -> f64 {
         let l = self.lengths();
         l.x * l.y
     }
 
-    /// The shortest periodic image of a separation vector [m].
+    /// The shortest periodic image of a separation vector (m).
     pub fn nearest_image(&self, mut separation: Vector3<f64>) -> Vector3<f64> {
         let l = self.lengths();
         for axis in 0..3 {
@@ -40,7 +40,7 @@ impl Domain {
         separation
     }
 
-    /// The image of a position that lies inside the box along periodic axes [m].
+    /// The image of a position that lies inside the box along periodic axes (m).
     pub fn wrap(&self, mut position: Vector3<f64>) -> Vector3<f64> {
         let l = self.lengths();
         for axis in 0..3 {
@@ -53,6 +53,43 @@ impl Domain {
             }
         }
         position
+    }
+}
+
+/// Periodic images in the inner loops: open axes have no inverse length, so they wrap to themselves.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Images {
+    /// Lengths of the box (m).
+    pub lengths: [f64; 3],
+    /// Their inverses along periodic axes, 0 along open ones (1/m).
+    pub inverse: [f64; 3],
+}
+
+impl Images {
+    pub fn of(domain: &Domain) -> Self {
+        let lengths: [f64; 3] = domain.lengths().into();
+        Images {
+            lengths,
+            inverse: std::array::from_fn(|k| {
+                if domain.periodic[k] {
+                    1.0 / lengths[k]
+                } else {
+                    0.0
+                }
+            }),
+        }
+    }
+
+    /// Squared distance of the nearest images of two centres (m²).
+    #[inline(always)]
+    pub fn distance_squared(&self, a: &[f64; 4], b: &[f64; 4]) -> f64 {
+        let mut sum = 0.0;
+        for k in 0..3 {
+            let d = a[k] - b[k];
+            let d = d - self.lengths[k] * (d * self.inverse[k]).round_ties_even();
+            sum += d * d;
+        }
+        sum
     }
 }
 

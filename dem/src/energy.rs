@@ -2,7 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
-/// Energy at one instant [J]; fixed grains do not count.
+/// Energy at one instant (J); fixed grains do not count.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Energy {
     /// Σ m v²/2.
@@ -20,17 +20,17 @@ pub struct Energy {
 }
 
 impl Energy {
-    /// Kinetic energy [J].
+    /// Kinetic energy (J).
     pub fn kinetic(&self) -> f64 {
         self.translation + self.rotation
     }
 
-    /// Energy of all springs [J].
+    /// Energy of all springs (J).
     pub fn elastic(&self) -> f64 {
         self.normal + self.tangential + self.rolling + self.twisting
     }
 
-    /// Kinetic and elastic energy [J].
+    /// Kinetic and elastic energy (J).
     pub fn total(&self) -> f64 {
         self.kinetic() + self.elastic()
     }

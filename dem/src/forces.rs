@@ -4,6 +4,7 @@
 //! split over threads gives the same bits.
 
 use crate::contact::{HISTORY_ROLLING, Interaction, Lever, Step, Touch, Wrench};
+use crate::domain::Images;
 use crate::grains::Grains;
 use crate::lanes::{Lanes4, Portable, Vec3, has_avx2};
 use crate::reach::Reach;
@@ -14,9 +15,7 @@ pub(crate) struct Field<'a> {
     pub place: &'a [[f64; 4]],
     pub motion: &'a [[f64; 4]],
     pub turn: &'a [[f64; 4]],
-    pub lengths: [f64; 3],
-    /// 0 along open axes.
-    pub inverse_lengths: [f64; 3],
+    pub images: Images,
     pub lever: Lever,
     pub step: Step,
 }
@@ -136,8 +135,8 @@ fn batch<L: Lanes4, I: Interaction>(
     let [dx, dy, dz, reach] = combine(field.place, i, j, minus);
     let mut d = [dx, dy, dz];
     for (k, d) in d.iter_mut().enumerate() {
-        let turns = (*d * L::splat(field.inverse_lengths[k])).round();
-        *d = *d - L::splat(field.lengths[k]) * turns;
+        let turns = (*d * L::splat(field.images.inverse[k])).round();
+        *d = *d - L::splat(field.images.lengths[k]) * turns;
     }
     let d = Vec3(d);
     let r2 = d.dot(d);

@@ -5,15 +5,15 @@ use nalgebra::Vector3;
 /// A grain as a scene describes it (SI).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Grain {
-    /// Centre [m].
+    /// Centre (m).
     pub position: Vector3<f64>,
-    /// Velocity [m/s].
+    /// Velocity (m/s).
     pub velocity: Vector3<f64>,
-    /// Angular velocity [rad/s].
+    /// Angular velocity (rad/s).
     pub spin: Vector3<f64>,
-    /// Radius [m].
+    /// Radius (m).
     pub radius: f64,
-    /// Density of the grain's material [kg/m³].
+    /// Density of the grain's material (kg/m³).
     pub density: f64,
     /// Keeps its velocity whatever touches it: part of a rough base.
     pub fixed: bool,
@@ -32,7 +32,7 @@ impl Grain {
         }
     }
 
-    /// Mass of the sphere [kg].
+    /// Mass of the sphere (kg).
     pub fn mass(&self) -> f64 {
         4.0 / 3.0 * std::f64::consts::PI * self.radius.powi(3) * self.density
     }
@@ -53,7 +53,7 @@ pub(crate) struct Grains {
     pub motion: Vec<[f64; 4]>,
     /// Radius times angular velocity half a step back, inverse radius.
     pub turn: Vec<[f64; 4]>,
-    /// Mass [kg], also of fixed grains.
+    /// Mass (kg), also of fixed grains.
     pub mass: Vec<f64>,
     /// Number given at the start.
     pub id: Vec<u32>,
@@ -91,7 +91,7 @@ impl Grains {
         self.motion[i][3] == 0.0
     }
 
-    /// Reorders all rows so that new grain `k` is old grain `order[k]`.
+    /// Reorders all rows so that new grain `k` is old grain `order(k)`.
     pub fn reorder(&mut self, order: &[u32], scratch: &mut Grains) {
         let n = self.len();
         scratch.place.clear();

@@ -19,20 +19,20 @@ pub(crate) struct Pull<'a> {
     pub reach: &'a Reach,
     pub planes: &'a PlaneContacts,
     pub slot_rows: usize,
-    /// Gravity [m/s²] and a zero.
+    /// Gravity (m/s²) and a zero.
     pub gravity: [f64; 4],
-    /// Time over which forces act [s]: half a step at the start of a run, else a step.
+    /// Time over which forces act (s): half a step at the start of a run, else a step.
     pub kick: f64,
-    /// Time over which grains move [s].
+    /// Time over which grains move (s).
     pub drift: f64,
 }
 
 /// What the pass leaves for each row of grains.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct RowResult {
-    /// Largest speed against the row's drift [m/s].
+    /// Largest speed against the row's drift (m/s).
     pub fluctuation: f64,
-    /// Momentum that fixed grains of the row have taken from free ones [N s].
+    /// Momentum that fixed grains of the row have taken from free ones (N s).
     pub impulse: [f64; 3],
 }
 
@@ -173,7 +173,7 @@ fn rows_in<L: Lanes4>(task: Task, pull: &Pull) {
     let gravity = L::load(&pull.gravity);
     let spin_up = L::splat(1.0 / SPHERE_INERTIA);
     for (row, result) in task.rows.iter().zip(task.results) {
-        let mut fastest: f64 = 0.0;
+        let mut fastest = 0.0_f64;
         for g in row.start as usize..row.end as usize {
             let k = g - task.from;
             let [force, torque, moment] = gather_lanes::<L>(pull, g);
@@ -192,8 +192,7 @@ fn rows_in<L: Lanes4>(task: Task, pull: &Pull) {
             for (v, w) in v.iter().zip(&row.drift) {
                 speed2 += (v - w) * (v - w);
             }
-            // Written so that a speed that is not a number is kept.
-            if !(speed2 <= fastest) {
+            if speed2 > fastest || speed2.is_nan() {
                 fastest = speed2;
             }
             if v[3] == 0.0 {

@@ -13,7 +13,7 @@
 //! beyond two cells cost no rebuilds: only motion against the neighbourhood does. The bound needs no
 //! stored positions and does not depend on threads.
 
-use crate::domain::Domain;
+use crate::domain::{Domain, Images};
 use crate::grains::Grains;
 use rayon::prelude::*;
 
@@ -101,16 +101,16 @@ impl Grid {
 /// Verlet list with contact history.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Neighbours {
-    /// Pairs of grain i: `first[i]..first[i + 1]`.
+    /// Pairs of grain i: `first(i)..first[i + 1]`.
     pub first: Vec<u32>,
     /// The partner j > i of each pair.
     pub partner: Vec<u32>,
     /// History of each pair, `history_width` numbers; zero where the pair does not touch.
     pub history: Vec<f64>,
     pub rows: Vec<Row>,
-    /// T of each row since the build [m].
+    /// T of each row since the build (m).
     pub travel: Vec<f64>,
-    /// Time since the build [s].
+    /// Time since the build (s).
     pub age: f64,
     /// Row pairs up to two apart, a ≤ b.
     row_pairs: Vec<(u32, u32)>,
@@ -392,8 +392,8 @@ fn outdated(pairs: &[(u32, u32)], rows: &[Row], travel: &[f64], age: f64, skin: 
         let (ra, rb) = (&rows[a as usize], &rows[b as usize]);
         let d: [f64; 3] = std::array::from_fn(|k| ra.drift[k] - rb.drift[k]);
         let apart = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt() * age;
-        // Written so that a travel that is not a number counts as outdated.
-        !(travel[a as usize] + travel[b as usize] + apart <= skin)
+        let approach = travel[a as usize] + travel[b as usize] + apart;
+        approach > skin || approach.is_nan()
     })
 }
 
@@ -406,14 +406,7 @@ fn search_rows(
     skin: f64,
 ) {
     let [nx, ny, _] = grid.cells;
-    let lengths = domain.lengths();
-    let inverse: [f64; 3] = std::array::from_fn(|k| {
-        if domain.periodic[k] {
-            1.0 / lengths[k]
-        } else {
-            0.0
-        }
-    });
+    let images = Images::of(domain);
     part.counts.clear();
     part.partner.clear();
     let [xs, ys, zs] = &mut part.scratch;
@@ -435,12 +428,7 @@ fn search_rows(
                             let from = first[other].max(i + 1);
                             for j in from..first[other + 1].max(from) {
                                 let xj = &grains.place[j as usize];
-                                let mut r2 = 0.0;
-                                for k in 0..3 {
-                                    let d = xi[k] - xj[k];
-                                    let d = d - lengths[k] * (d * inverse[k]).round_ties_even();
-                                    r2 += d * d;
-                                }
+                                let r2 = images.distance_squared(xi, xj);
                                 let near = reach + xj[3];
                                 // Two fixed grains have nothing to say to each other.
                                 let idle = held && grains.motion[j as usize][3] == 0.0;

@@ -163,7 +163,7 @@ impl Simulation {
         }
     }
 
-    /// Momentum of the free grains at this instant [N s].
+    /// Momentum of the free grains at this instant (N s).
     pub fn momentum(&mut self) -> Vector3<f64> {
         self.samples()
             .iter()
@@ -172,7 +172,7 @@ impl Simulation {
             .sum()
     }
 
-    /// Momentum that fixed grains and planes have taken from the free grains since the start [N s].
+    /// Momentum that fixed grains and planes have taken from the free grains since the start (N s).
     ///
     /// With constant gravity g: `momentum(t) + wall_impulse(t) - m g t` is constant to round-off, up
     /// to half a step's force, since velocities inside live half a step back.
@@ -181,7 +181,7 @@ impl Simulation {
         Vector3::from(self.impulse)
     }
 
-    /// Mass of the free grains [kg].
+    /// Mass of the free grains (kg).
     pub fn free_mass(&self) -> f64 {
         (0..self.grains.len())
             .filter(|&i| !self.grains.is_fixed(i))
@@ -189,7 +189,7 @@ impl Simulation {
             .sum()
     }
 
-    /// Momentum of the free grains as the integrator holds it, half a step back [N s].
+    /// Momentum of the free grains as the integrator holds it, half a step back (N s).
     ///
     /// `leapfrog_momentum(t) + wall_impulse(t)` changes by exactly the weight times time.
     pub fn leapfrog_momentum(&self) -> Vector3<f64> {

@@ -9,14 +9,14 @@ use nalgebra::Vector3;
 /// A resting plane; grains live on the side its normal points to.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Plane {
-    /// A point of the plane [m].
+    /// A point of the plane (m).
     pub point: Vector3<f64>,
     /// Unit normal, into the grains.
     pub normal: Vector3<f64>,
 }
 
 impl Plane {
-    /// Distance of a point in front of the plane [m].
+    /// Distance of a point in front of the plane (m).
     pub fn distance(&self, x: &Vector3<f64>) -> f64 {
         (x - self.point).dot(&self.normal)
     }
@@ -36,9 +36,9 @@ pub(crate) struct PlaneContact {
 #[derive(Clone, Debug, Default)]
 pub(crate) struct PlaneContacts {
     pub contacts: Vec<PlaneContact>,
-    /// Contacts of grain g: `first[g]..first[g + 1]`; empty where there are no planes.
+    /// Contacts of grain g: `first(g)..first[g + 1]`; empty where there are no planes.
     first: Vec<u32>,
-    /// For each row and plane, how far its nearest *unlisted* surface was at the build [m].
+    /// For each row and plane, how far its nearest *unlisted* surface was at the build (m).
     clearance: Vec<f64>,
     old: Vec<PlaneContact>,
 }

@@ -6,6 +6,7 @@
 //! its slot, so neither the moment at which this list is made nor the number of threads changes a bit
 //! of the sums.
 
+use crate::domain::Images;
 use crate::grains::Grains;
 use crate::neighbours::Neighbours;
 
@@ -20,18 +21,18 @@ pub(crate) struct Reach {
     pub count: usize,
     /// Which pair of the Verlet list each one is.
     pub source: Vec<u32>,
-    /// Slots of grain g as `i`: `first_own[g]..first_own[g + 1]`.
+    /// Slots of grain g as `i`: `first_own(g)..first_own[g + 1]`.
     pub first_own: Vec<u32>,
-    /// Slots of grain g as `j`: `other[first_other[g]..first_other[g + 1]]`.
+    /// Slots of grain g as `j`: `other[first_other(g)..first_other[g + 1]]`.
     pub first_other: Vec<u32>,
     pub other: Vec<u32>,
     /// `history_width` rows of four for each batch.
     pub history: Vec<[f64; 4]>,
     /// `slot_rows` rows for each pair: force, moment of the tangential force, further moment.
     pub slots: Vec<[f64; 4]>,
-    /// Travel of each row since this list was made [m].
+    /// Travel of each row since this list was made (m).
     pub travel: Vec<f64>,
-    /// Time since then [s].
+    /// Time since then (s).
     pub age: f64,
     next: Vec<u32>,
 }
@@ -54,8 +55,7 @@ impl Reach {
         &mut self,
         grains: &Grains,
         list: &Neighbours,
-        lengths: [f64; 3],
-        inverse_lengths: [f64; 3],
+        images: &Images,
         skin: f64,
         width: usize,
         slot_rows: usize,
@@ -73,12 +73,7 @@ impl Reach {
             for k in list.first[i]..list.first[i + 1] {
                 let j = list.partner[k as usize];
                 let xj = &grains.place[j as usize];
-                let mut r2 = 0.0;
-                for a in 0..3 {
-                    let d = xi[a] - xj[a];
-                    let d = d - lengths[a] * (d * inverse_lengths[a]).round_ties_even();
-                    r2 += d * d;
-                }
+                let r2 = images.distance_squared(xi, xj);
                 let near = near + xj[3];
                 if r2 < near * near {
                     self.i.push(i as u32);

@@ -21,7 +21,7 @@ pub enum Threads {
 pub struct Setup {
     /// The box.
     pub domain: Domain,
-    /// Acceleration of gravity [m/s²].
+    /// Acceleration of gravity (m/s²).
     pub gravity: Vector3<f64>,
     /// What touching surfaces do to each other.
     pub law: ContactLaw,
@@ -29,7 +29,7 @@ pub struct Setup {
     pub grains: Vec<Grain>,
     /// Plane walls.
     pub planes: Vec<Plane>,
-    /// Length of a step [s].
+    /// Length of a step (s).
     pub timestep: f64,
     /// Sharing of a step over threads.
     pub threads: Threads,
@@ -56,9 +56,9 @@ pub enum SetupError {
     NarrowDomain {
         /// x, y or z.
         axis: char,
-        /// Its length [m].
+        /// Its length (m).
         length: f64,
-        /// What it must be [m].
+        /// What it must be (m).
         least: f64,
     },
     /// A preparation was stopped by its observer.

@@ -1,7 +1,7 @@
 //! The simulation: one state, one step.
 
 use crate::contact::{ContactLaw, HISTORY_ROLLING, Interaction, Rolling, Sliding, Step};
-use crate::domain::Domain;
+use crate::domain::{Domain, Images};
 use crate::forces::{self, Field};
 use crate::grains::Grains;
 use crate::motion::{self, Pull, RowResult};
@@ -23,9 +23,9 @@ pub enum Diverged {
     Escape {
         /// Number of the grain.
         grain: u32,
-        /// When it was found [s].
+        /// When it was found (s).
         time: f64,
-        /// The step [s].
+        /// The step (s).
         timestep: f64,
     },
     /// Grains have run through each other.
@@ -36,11 +36,11 @@ pub enum Diverged {
     Overlap {
         /// Overlap over twice the reduced radius.
         overlap: f64,
-        /// When it was found [s].
+        /// When it was found (s).
         time: f64,
-        /// The step [s].
+        /// The step (s).
         timestep: f64,
-        /// k_n [N/m].
+        /// k_n (N/m).
         stiffness: f64,
     },
 }
@@ -103,7 +103,7 @@ pub struct Simulation {
     pub(crate) reach: Reach,
     pub(crate) plane_contacts: PlaneContacts,
     row_results: Vec<RowResult>,
-    /// Momentum taken by fixed grains and planes since the start [N s].
+    /// Momentum taken by fixed grains and planes since the start (N s).
     pub(crate) impulse: [f64; 3],
     /// Whether slots hold the forces of the present positions.
     current: bool,
@@ -231,8 +231,7 @@ impl Simulation {
             place: &self.grains.place,
             motion: &self.grains.motion,
             turn: &self.grains.turn,
-            lengths: self.domain.lengths().into(),
-            inverse_lengths: self.inverse_lengths(),
+            images: Images::of(&self.domain),
             lever: self.law.lever,
             step,
         };
@@ -351,8 +350,7 @@ impl Simulation {
         self.reach.build(
             &self.grains,
             &self.list,
-            self.domain.lengths().into(),
-            self.inverse_lengths(),
+            &Images::of(&self.domain),
             self.reach_skin,
             self.law.history(),
             self.slot_rows(),
@@ -373,17 +371,6 @@ impl Simulation {
     /// Rows of a contact's slot under the scene's law.
     pub(crate) fn slot_rows(&self) -> usize {
         self.kernel.slot_rows()
-    }
-
-    fn inverse_lengths(&self) -> [f64; 3] {
-        let l = self.domain.lengths();
-        std::array::from_fn(|k| {
-            if self.domain.periodic[k] {
-                1.0 / l[k]
-            } else {
-                0.0
-            }
-        })
     }
 
     /// Sets the velocities of all free grains; spins and contacts stay.
@@ -425,7 +412,7 @@ impl Simulation {
         self.rebuild();
     }
 
-    /// Time since the start [s].
+    /// Time since the start (s).
     pub fn time(&self) -> f64 {
         self.steps as f64 * self.timestep
     }
@@ -435,7 +422,7 @@ impl Simulation {
         self.steps
     }
 
-    /// Length of a step [s].
+    /// Length of a step (s).
     pub fn timestep(&self) -> f64 {
         self.timestep
     }
@@ -450,7 +437,7 @@ impl Simulation {
         &self.law
     }
 
-    /// Acceleration of gravity [m/s²].
+    /// Acceleration of gravity (m/s²).
     pub fn gravity(&self) -> Vector3<f64> {
         self.gravity
     }

@@ -8,15 +8,15 @@ use nalgebra::Vector3;
 pub struct GrainSample {
     /// Number the grain was given at the start; it never changes.
     pub id: u32,
-    /// Centre [m], inside the box along periodic axes.
+    /// Centre (m), inside the box along periodic axes.
     pub position: Vector3<f64>,
-    /// Velocity of the centre [m/s].
+    /// Velocity of the centre (m/s).
     pub velocity: Vector3<f64>,
-    /// Angular velocity [rad/s].
+    /// Angular velocity (rad/s).
     pub spin: Vector3<f64>,
-    /// Radius [m].
+    /// Radius (m).
     pub radius: f64,
-    /// Mass [kg]; the true mass, also for fixed grains.
+    /// Mass (kg); the true mass, also for fixed grains.
     pub mass: f64,
     /// Held in place: part of a wall or a rough base.
     pub fixed: bool,
@@ -38,13 +38,13 @@ pub struct ContactSample {
     pub grain: usize,
     /// The other side; it feels the opposite force.
     pub partner: Partner,
-    /// Overlap, positive when pressed together [m].
+    /// Overlap, positive when pressed together (m).
     pub overlap: f64,
-    /// Force on `grain` [N].
+    /// Force on `grain` (N).
     pub force: Vector3<f64>,
-    /// From the centre of `grain` to the contact point [m].
+    /// From the centre of `grain` to the contact point (m).
     pub arm: Vector3<f64>,
-    /// From the centre of `partner` to the contact point [m]; zero for a wall.
+    /// From the centre of `partner` to the contact point (m); zero for a wall.
     ///
     /// `arm - partner_arm` is the branch vector from `grain` to `partner`, nearest image.
     pub partner_arm: Vector3<f64>,
@@ -53,11 +53,11 @@ pub struct ContactSample {
 /// All grains and contacts at one instant. Reuse one value: its buffers are kept.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
-    /// Time [s].
+    /// Time (s).
     pub time: f64,
     /// The box.
     pub domain: Domain,
-    /// Acceleration of gravity [m/s²].
+    /// Acceleration of gravity (m/s²).
     pub gravity: Vector3<f64>,
     /// All grains, fixed ones included.
     pub grains: Vec<GrainSample>,

@@ -10,18 +10,18 @@
 use crate::contact::ContactLaw;
 use std::f64::consts::PI;
 
-/// k_n [N/m] that keeps the overlap below `largest_overlap` [m] at `speed` [m/s] for mass [kg].
+/// k_n (N/m) that keeps the overlap below `largest_overlap` (m) at `speed` (m/s) for mass (kg).
 pub fn stiffness(mass: f64, speed: f64, largest_overlap: f64) -> f64 {
     mass * (speed / largest_overlap).powi(2)
 }
 
-/// Step [s] that resolves a contact of two grains of `mass` [kg] by `steps_per_contact` steps.
+/// Step (s) that resolves a contact of two grains of `mass` (kg) by `steps_per_contact` steps.
 pub fn step(mass: f64, stiffness: f64, steps_per_contact: f64) -> f64 {
     PI * (mass / (2.0 * stiffness)).sqrt() / steps_per_contact
 }
 
-/// The step at which leap-frog becomes unstable for a grain of `mass` [kg] held by one spring of the
-/// law against a fixed partner, `2/ω` [s]; packed grains have several contacts and less room.
+/// The step at which leap-frog becomes unstable for a grain of `mass` (kg) held by one spring of the
+/// law against a fixed partner, `2/ω` (s); packed grains have several contacts and less room.
 ///
 /// The fastest of the normal, tangential (which also turns the grain) and rolling oscillations counts.
 pub fn stability_limit(law: &ContactLaw, mass: f64) -> f64 {

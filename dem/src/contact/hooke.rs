@@ -5,7 +5,7 @@
 //! C_n = -2 ln ε_n √( k_n m / (π² + ln² ε_n) )             m = m_i m_j/(m_i + m_j)
 //! τ   = √( m (π² + ln² ε_n) / k_n )                        duration of a contact
 //! ```
-//! k_n [N/m] stiffness, ε_n [–] ratio of separation to approach speed, C_n [N s/m].
+//! k_n (N/m) stiffness, ε_n (–) ratio of separation to approach speed, C_n (N s/m).
 //! Source: Thuillet 2019, Eq. 2.1, 2.3, 2.8, 2.9; τ from its Eq. SM 17–19. The force is not clamped
 //! in the last moments of a contact, where the dashpot outweighs the spring and pulls: ε_n and τ
 //! above belong to the unclamped law.
@@ -23,19 +23,19 @@ use std::f64::consts::PI;
 /// Linear normal spring and dashpot.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Hooke {
-    /// k_n [N/m].
+    /// k_n (N/m).
     pub stiffness: f64,
     /// ε_n, in (0, 1].
     pub restitution: f64,
 }
 
 impl Hooke {
-    /// `C_n / √m` [N s m⁻¹ kg⁻¹ᐟ²].
+    /// `C_n / √m` (N s m⁻¹ kg⁻¹ᐟ²).
     pub fn damping_factor(&self) -> f64 {
         damping_factor(self.stiffness, self.restitution)
     }
 
-    /// Duration of an isolated contact, τ [s], at a reduced mass [kg].
+    /// Duration of an isolated contact, τ (s), at a reduced mass (kg).
     pub fn contact_time(&self, reduced_mass: f64) -> f64 {
         let ln = self.restitution.ln();
         (reduced_mass * (PI * PI + ln * ln) / self.stiffness).sqrt()
@@ -63,7 +63,7 @@ pub struct Coefficients {
 }
 
 impl Coefficients {
-    /// Normal force, positive when it pushes apart [N].
+    /// Normal force, positive when it pushes apart (N).
     #[inline(always)]
     pub fn force<L: Lane>(&self, overlap: L, approach: L, inverse_mass: L) -> L {
         let damping = L::splat(self.damping_factor) / inverse_mass.sqrt();

@@ -2,7 +2,7 @@
 //!
 //! A law is composed of a normal part, a tangential spring and, where the scene asks for it, rolling
 //! and twisting springs. Pairs and walls call the *same* functions: a wall is a partner of infinite
-//! mass and radius. Laws are written for any [`Lane`] and know nothing of grains, lists or threads.
+//! mass and radius. Laws are written for any lane width and know nothing of grains, lists or threads.
 
 pub mod hooke;
 pub mod shape_springs;
@@ -56,7 +56,7 @@ impl ContactLaw {
         }
     }
 
-    /// Normal dashpot coefficient C_n [N s/m] at a reduced mass [kg].
+    /// Normal dashpot coefficient C_n (N s/m) at a reduced mass (kg).
     pub fn normal_damping(&self, reduced_mass: f64) -> f64 {
         self.normal.damping_factor() * reduced_mass.sqrt()
     }
@@ -67,33 +67,33 @@ impl ContactLaw {
 pub struct Touch<L> {
     /// Unit vector from `j` to `i`.
     pub normal: Vec3<L>,
-    /// Overlap, positive when pressed together [m].
+    /// Overlap, positive when pressed together (m).
     pub overlap: L,
-    /// Velocity of `i`'s surface against `j`'s at the contact point [m/s].
+    /// Velocity of `i`'s surface against `j`'s at the contact point (m/s).
     pub velocity: Vec3<L>,
-    /// Angular velocity of `i` minus that of `j` [rad/s]; only read by laws that roll.
+    /// Angular velocity of `i` minus that of `j` (rad/s); only read by laws that roll.
     pub spin: Vec3<L>,
-    /// `1/m_i + 1/m_j` [1/kg].
+    /// `1/m_i + 1/m_j` (1/kg).
     pub inverse_mass: L,
-    /// `1/R_i + 1/R_j` [1/m].
+    /// `1/R_i + 1/R_j` (1/m).
     pub curvature: L,
 }
 
 /// What side `i` feels; side `j` feels the opposite force and moment at the same contact point.
 #[derive(Clone, Copy)]
 pub struct Wrench<L> {
-    /// Force [N].
+    /// Force (N).
     pub force: Vec3<L>,
-    /// Its tangential part [N].
+    /// Its tangential part (N).
     pub tangential: Vec3<L>,
-    /// Rolling and twisting moment beyond the force's own [N m].
+    /// Rolling and twisting moment beyond the force's own (N m).
     pub moment: Vec3<L>,
 }
 
 /// Everything about a step that a law needs.
 #[derive(Clone, Copy, Debug)]
 pub struct Step {
-    /// Time by which springs are stretched at this evaluation [s]: the step, or 0 at the first
+    /// Time by which springs are stretched at this evaluation (s): the step, or 0 at the first
     /// evaluation of a run, when no time has passed yet.
     pub stretch: f64,
 }

@@ -7,8 +7,8 @@
 //! M_R = k_R δ_R + C_R ω_R,  |M_R| ≤ μ_R β R |F_n|        k_R = k_n (βR)²     C_R = C_n (βR)²
 //! M_T = k_T δ_T + C_T ω_T,  |M_T| ≤ μ_T β R μ |F_n|      k_T = 2 k_t (βR)²   C_T = 2 C_t (βR)²
 //! ```
-//! ω_R, ω_T [rad/s] relative angular velocity in the contact plane and about its normal, δ their
-//! integrals [rad]; μ is the sliding coefficient, which stands in the twisting limit only. The moment
+//! ω_R, ω_T (rad/s) relative angular velocity in the contact plane and about its normal, δ their
+//! integrals (rad); μ is the sliding coefficient, which stands in the twisting limit only. The moment
 //! acts against ω on `i`, opposite on `j`. Source: Thuillet 2019, Eq. 2.11–2.13 (after Zhang et al.
 //! 2017). The limit acts as [`super::slider`] says; the source limits the spring only.
 
@@ -47,12 +47,12 @@ impl ShapeParameter {
         }
     }
 
-    /// Rolling stiffness k_R [N m/rad] at a reduced radius [m].
+    /// Rolling stiffness k_R (N m/rad) at a reduced radius (m).
     pub fn rolling_stiffness(&self, normal: &Hooke, reduced_radius: f64) -> f64 {
         normal.stiffness * (self.beta * reduced_radius).powi(2)
     }
 
-    /// Twisting stiffness k_T [N m/rad] at a reduced radius [m].
+    /// Twisting stiffness k_T (N m/rad) at a reduced radius (m).
     pub fn twisting_stiffness(
         &self,
         normal: &Hooke,

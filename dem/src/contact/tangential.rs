@@ -5,7 +5,7 @@
 //! k_t = ratio · k_n,   C_t = -2 ln ε_t √( k_t m / (π² + ln² ε_t) )
 //! S  += u_t dt, kept in the contact plane
 //! ```
-//! S [m] displacement of the surfaces from where they stuck, u_t [m/s] slip velocity, μ [–], ε_t [–]
+//! S (m) displacement of the surfaces from where they stuck, u_t (m/s) slip velocity, μ (–), ε_t (–)
 //! only a way to name C_t (1 = no dashpot), m the reduced mass. Source: Thuillet 2019, Eq. 2.2, 2.4,
 //! 2.5, 2.10. The limit acts as [`super::slider`] says.
 
@@ -27,12 +27,12 @@ pub struct TangentialSpring {
 }
 
 impl TangentialSpring {
-    /// k_t [N/m] over a normal spring.
+    /// k_t (N/m) over a normal spring.
     pub fn stiffness(&self, normal: &Hooke) -> f64 {
         self.stiffness_ratio * normal.stiffness
     }
 
-    /// `C_t / √m` [N s m⁻¹ kg⁻¹ᐟ²] over a normal spring.
+    /// `C_t / √m` (N s m⁻¹ kg⁻¹ᐟ²) over a normal spring.
     pub fn damping_factor(&self, normal: &Hooke) -> f64 {
         damping_factor(self.stiffness(normal), self.restitution)
     }

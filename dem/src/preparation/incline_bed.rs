@@ -24,17 +24,17 @@ pub struct InclineBed {
     pub grains: usize,
     /// Their size law; the base has the same.
     pub radius: RadiusLaw,
-    /// Density of the grains [kg/m³].
+    /// Density of the grains (kg/m³).
     pub density: f64,
-    /// Length of the periodic box downslope [m].
+    /// Length of the periodic box downslope (m).
     pub length: f64,
-    /// Width of the periodic box [m].
+    /// Width of the periodic box (m).
     pub width: f64,
     /// Contact law.
     pub law: ContactLaw,
-    /// Magnitude of gravity [m/s²].
+    /// Magnitude of gravity (m/s²).
     pub gravity: f64,
-    /// Step [s].
+    /// Step (s).
     pub timestep: f64,
     /// Seed of all random numbers.
     pub seed: u64,
@@ -47,7 +47,7 @@ pub struct BedReport {
     pub grains: usize,
     /// Fixed grains of the base.
     pub base_grains: usize,
-    /// Height of the free surface above the base's tops [m], from the grains' mean height.
+    /// Height of the free surface above the base's tops (m), from the grains' mean height.
     pub depth: f64,
     /// Volume of free grains over floor area times depth.
     pub solid_fraction: f64,
@@ -55,7 +55,7 @@ pub struct BedReport {
     pub coordination: f64,
     /// Kinetic energy left over m g d a grain.
     pub kinetic_energy: f64,
-    /// Time it took to settle [s].
+    /// Time it took to settle (s).
     pub settling_time: f64,
     /// Grains times steps integrated.
     pub grain_steps: u64,

@@ -5,13 +5,13 @@ use rand::{Rng, RngExt};
 use rand_distr::{Distribution, Normal};
 use serde::{Deserialize, Serialize};
 
-/// Distribution of radii [m].
+/// Distribution of radii (m).
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 #[serde(tag = "law", rename_all = "kebab-case")]
 pub enum RadiusLaw {
     /// Normal distribution, drawn again beyond `cut` standard deviations.
     Gaussian {
-        /// Mean radius [m].
+        /// Mean radius (m).
         mean: f64,
         /// Standard deviation over the mean.
         relative_deviation: f64,
@@ -20,9 +20,9 @@ pub enum RadiusLaw {
     },
     /// Uniform between two radii.
     Uniform {
-        /// Smallest radius [m].
+        /// Smallest radius (m).
         low: f64,
-        /// Largest radius [m].
+        /// Largest radius (m).
         high: f64,
     },
 }
@@ -62,7 +62,7 @@ impl RadiusLaw {
         }
     }
 
-    /// Mean radius [m].
+    /// Mean radius (m).
     pub fn mean(&self) -> f64 {
         match *self {
             RadiusLaw::Gaussian { mean, .. } => mean,
@@ -70,7 +70,7 @@ impl RadiusLaw {
         }
     }
 
-    /// Largest radius that can be drawn [m].
+    /// Largest radius that can be drawn (m).
     pub fn largest(&self) -> f64 {
         match *self {
             RadiusLaw::Gaussian {
@@ -82,7 +82,7 @@ impl RadiusLaw {
         }
     }
 
-    /// Draws a radius [m]; the law must have been validated.
+    /// Draws a radius (m); the law must have been validated.
     pub fn draw(&self, random: &mut impl Rng) -> f64 {
         match *self {
             RadiusLaw::Gaussian {

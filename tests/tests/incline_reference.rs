@@ -1,0 +1,101 @@
+//! The thesis' moderate material on an incline, against another code and against its own weight.
+
+#![allow(clippy::unwrap_used)]
+
+use colluvium_coupling::calibration::LocalPoint;
+use colluvium_coupling::incline::{InclineResult, InclineRun, Outcome, Purpose, Start};
+use colluvium_dem::preparation::Bed;
+use colluvium_tests::{LAMMPS_MODERATE_33, bed, incline, material, reference_line};
+use std::sync::OnceLock;
+
+/// 1 700 grains over a sticky base, 12 × 6 d: the reference's grains and box.
+fn moderate_bed() -> &'static Bed {
+    static BED: OnceLock<Bed> = OnceLock::new();
+    BED.get_or_init(|| bed(material(Some(0.2)), 1700, [12.0, 6.0], 11).unwrap())
+}
+
+fn run(slope: f64, start: Start, purpose: Purpose, times: [f64; 2]) -> InclineResult {
+    let law = material(Some(0.2));
+    let spec = incline(law, moderate_bed(), slope, start, purpose, times);
+    let mut run = InclineRun::new(spec).unwrap();
+    while !run.finished() {
+        run.advance(10_000).unwrap();
+    }
+    run.finish()
+}
+
+/// Mean deviation of points inside the reference's range of I: μ relative, μ_zz relative, φ.
+fn deviation(points: &[LocalPoint]) -> [f64; 3] {
+    let inside: Vec<_> = points
+        .iter()
+        .filter(|p| (0.2..0.42).contains(&p.inertial_number))
+        .collect();
+    assert!(inside.len() >= 6, "only {} points to compare", inside.len());
+    let line =
+        |column, p: &LocalPoint| reference_line(&LAMMPS_MODERATE_33, column, p.inertial_number);
+    let mean = |f: &dyn Fn(&LocalPoint) -> f64| {
+        inside.iter().map(|p| f(p)).sum::<f64>() / inside.len() as f64
+    };
+    [
+        mean(&|p| p.friction / line(1, p) - 1.0),
+        mean(&|p| p.friction_zz / line(2, p) - 1.0),
+        mean(&|p| p.solid_fraction - line(3, p)),
+    ]
+}
+
+#[test]
+fn flow_at_33_degrees_agrees_with_lammps_and_carries_its_weight() {
+    let start = Start::Flow {
+        inertial_number: 0.25,
+    };
+    let result = run(33.0, start, Purpose::Measure, [40.0, 50.0]);
+    assert!(result.flows());
+    let [mu, mu_zz, phi] = deviation(&result.points);
+    println!("against LAMMPS at equal I: μ {mu:+.4}, μ_zz {mu_zz:+.4}, φ {phi:+.4}");
+    assert!(mu.abs() < 0.03, "μ off by {mu}");
+    assert!(mu_zz.abs() < 0.03, "μ_zz off by {mu_zz}");
+    assert!(phi.abs() < 0.01, "φ off by {phi}");
+
+    let checks = result.checks.unwrap();
+    println!("{checks:?}");
+    assert!(checks.mass_relative < 1e-10, "{checks:?}");
+    assert!(checks.weight_relative < 0.01, "{checks:?}");
+
+    // Normal-stress differences are part of the flow: |τ|/p and |τ|/σ_zz must not be confused.
+    let p = &result.points[result.points.len() / 2];
+    assert!(
+        (1.02..1.12).contains(&(p.friction / p.friction_zz)),
+        "{p:?}"
+    );
+}
+
+#[test]
+fn round_grains_do_not_pass_for_the_moderate_material() {
+    // The negative control: without rolling springs the same comparison must fail.
+    let law = material(None);
+    let bed = bed(law, 800, [8.0, 6.0], 4).unwrap();
+    let start = Start::Flow {
+        inertial_number: 0.3,
+    };
+    let spec = incline(law, &bed, 29.0, start, Purpose::Measure, [20.0, 20.0]);
+    let mut run = InclineRun::new(spec).unwrap();
+    while !run.finished() {
+        run.advance(10_000).unwrap();
+    }
+    let [mu, ..] = deviation(&run.finish().points);
+    assert!(mu < -0.06, "μ off by {mu}");
+}
+
+#[test]
+fn rests_at_24_degrees_and_flows_at_33() {
+    let gentle = Start::Flow {
+        inertial_number: 0.06,
+    };
+    let rest = run(24.0, gentle, Purpose::StopSearch, [20.0, 40.0]);
+    assert_eq!(rest.outcome, Outcome::Rest, "{:?}", rest.steady);
+    assert!(!rest.flows());
+    let flow = run(33.0, gentle, Purpose::StopSearch, [20.0, 30.0]);
+    assert!(flow.flows(), "{:?} {:?}", flow.outcome, flow.steady);
+    let still = run(24.0, Start::Rest, Purpose::OnsetSearch, [20.0, 20.0]);
+    assert!(!still.flows(), "{:?} {:?}", still.outcome, still.steady);
+}
