@@ -56,6 +56,15 @@ impl Domain {
     }
 }
 
+/// Ties to even, for |x| < 2⁵¹: adding 3·2⁵¹ leaves no room for a fraction.
+///
+/// `round_ties_even` is a library call where SSE4.1 is not taken for granted (6 % of a run).
+#[inline(always)]
+fn nearest_integer(x: f64) -> f64 {
+    const NO_FRACTION: f64 = 6_755_399_441_055_744.0;
+    (x + NO_FRACTION) - NO_FRACTION
+}
+
 /// Periodic images in the inner loops: open axes have no inverse length, so they wrap to themselves.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct Images {
@@ -86,7 +95,7 @@ impl Images {
         let mut sum = 0.0;
         for k in 0..3 {
             let d = a[k] - b[k];
-            let d = d - self.lengths[k] * (d * self.inverse[k]).round_ties_even();
+            let d = d - self.lengths[k] * nearest_integer(d * self.inverse[k]);
             sum += d * d;
         }
         sum
@@ -96,6 +105,14 @@ impl Images {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn integers_are_those_of_the_library() {
+        for k in -4000..4000 {
+            let x = f64::from(k) * 0.125;
+            assert_eq!(nearest_integer(x), x.round_ties_even(), "{x}");
+        }
+    }
 
     #[test]
     fn images_wrap_only_along_periodic_axes() {
