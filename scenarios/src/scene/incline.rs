@@ -311,7 +311,8 @@ impl InclineScene {
                 ),
             );
         }
-        if self.time.limit < self.time.relax + self.time.average {
+        // Sums of decimal numbers may miss by a bit.
+        if self.time.limit < (self.time.relax + self.time.average) * (1.0 - 1e-9) {
             return out_of_range(
                 "time.limit",
                 self.time.limit,
