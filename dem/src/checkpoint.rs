@@ -24,8 +24,10 @@ fn wide(small: &[u32]) -> Vec<u64> {
     small.iter().map(|&x| u64::from(x)).collect()
 }
 
-fn narrow(wide: &[u64]) -> Vec<u32> {
-    wide.iter().map(|&x| x as u32).collect()
+fn narrow(name: &str, wide: &[u64]) -> Result<Vec<u32>, String> {
+    wide.iter()
+        .map(|&x| u32::try_from(x).map_err(|_| format!("array `{name}` has the number {x}")))
+        .collect()
 }
 
 impl Simulation {
@@ -108,25 +110,34 @@ impl Simulation {
             motion: rows(sized("grains/motion", 4 * n)?),
             turn: rows(sized("grains/turn", 4 * n)?),
             mass: sized("grains/mass", n)?.to_vec(),
-            id: narrow(record.counts("grains/id")?),
+            id: narrow("grains/id", record.counts("grains/id")?)?,
         };
         if grains.id.len() != n || grains.id.iter().any(|&id| id as usize >= n) {
             return Err("array `grains/id` does not number the grains of this scene".into());
         }
+        let finite = |rows: &[[f64; 4]]| rows.iter().flatten().all(|x| x.is_finite());
+        if !finite(&grains.place) || !finite(&grains.motion) || !finite(&grains.turn) {
+            return Err(
+                "array `grains/place`, `grains/motion` or `grains/turn` is not finite".into(),
+            );
+        }
         grains.pad();
-        let first = narrow(record.counts("list/first")?);
-        let partner = narrow(record.counts("list/partner")?);
-        let rising = first.windows(2).all(|w| w[0] <= w[1]);
-        if first.len() != n + 1
-            || !rising
-            || first[n] as usize != partner.len()
-            || partner.iter().any(|&j| j as usize >= n)
-        {
+        let first = narrow("list/first", record.counts("list/first")?)?;
+        let partner = narrow("list/partner", record.counts("list/partner")?)?;
+        let rising = first.first() == Some(&0) && first.windows(2).all(|w| w[0] <= w[1]);
+        // Each pair stands at its lower grain: j > i, which also keeps a grain from meeting itself.
+        let ordered = || {
+            first.windows(2).enumerate().all(|(i, w)| {
+                let pairs = &partner[w[0] as usize..w[1] as usize];
+                pairs.iter().all(|&j| j as usize > i && (j as usize) < n)
+            })
+        };
+        if first.len() != n + 1 || !rising || first[n] as usize != partner.len() || !ordered() {
             return Err("arrays `list/first` and `list/partner` do not fit each other".into());
         }
         let width = self.law.history();
         self.list.history = sized("list/history", width * partner.len())?.to_vec();
-        let ends = narrow(record.counts("list/row_end")?);
+        let ends = narrow("list/row_end", record.counts("list/row_end")?)?;
         let drifts: Vec<[f64; 3]> = rows(sized("list/row_drift", 3 * ends.len())?);
         let cells: Vec<usize> = record
             .counts("list/cells")?
@@ -159,7 +170,7 @@ impl Simulation {
         self.list.restore([nx, ny, nz], self.domain.periodic);
         self.grains = grains;
 
-        let of = narrow(record.counts("planes/contact")?);
+        let of = narrow("planes/contact", record.counts("planes/contact")?)?;
         let histories: Vec<[f64; HISTORY_ROLLING]> =
             rows(sized("planes/history", of.len() / 2 * HISTORY_ROLLING)?);
         let contacts: Vec<PlaneContact> = of
@@ -174,9 +185,11 @@ impl Simulation {
                 slot: [[0.0; 4]; 3],
             })
             .collect();
-        if contacts
-            .iter()
-            .any(|c| c.grain as usize >= n || c.plane as usize >= self.planes.len())
+        let sorted = contacts.windows(2).all(|w| w[0].grain <= w[1].grain);
+        if !sorted
+            || contacts
+                .iter()
+                .any(|c| c.grain as usize >= n || c.plane as usize >= self.planes.len())
         {
             return Err("array `planes/contact` names unknown grains or planes".into());
         }

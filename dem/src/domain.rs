@@ -5,8 +5,8 @@ use serde::{Deserialize, Serialize};
 
 /// An axis-aligned box `[lower, upper]` in metres; a periodic axis wraps around.
 ///
-/// Along an axis that is not periodic the bounds only say where the search grid is laid: grains may
-/// leave them and are still found.
+/// Along an axis that is not periodic the bounds hold nothing back: the search goes by where the
+/// grains are.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Domain {
     /// Lower corner (m).

@@ -28,7 +28,7 @@ pub(crate) const fn slot_rows<I: Interaction>() -> usize {
 /// Batches that one task works on at least.
 const BATCHES_A_TASK: usize = 256;
 
-/// Evaluates the law on all pairs within reach; the largest overlap over twice the reduced radius.
+/// Evaluates the law on all pairs within reach; the largest overlap over the harmonic mean radius.
 pub(crate) fn evaluate<I: Interaction>(
     law: &I,
     grains: &Grains,

@@ -25,6 +25,7 @@ mod record;
 mod setup;
 mod simulation;
 mod snapshot;
+mod state_hash;
 pub mod timestep;
 
 pub use contact::{ContactLaw, Hooke, Lever, ShapeParameter, TangentialSpring};
@@ -36,3 +37,4 @@ pub use record::Record;
 pub use setup::{Setup, SetupError, Threads};
 pub use simulation::{Diverged, Simulation};
 pub use snapshot::{ContactSample, GrainSample, Partner, Snapshot};
+pub use state_hash::StateHash;

@@ -50,12 +50,12 @@ impl Grid {
             ..Grid::default()
         };
         let lengths = domain.lengths();
-        // A lone grain far away must not cost a grid of empty cells: open axes are coarsened.
+        // Few grains in a large box, or a lone one far away, must not cost a grid of empty cells.
         let mut stretch = 1.0;
         loop {
             for k in 0..3 {
                 let (from, length, size) = if domain.periodic[k] {
-                    (domain.lower[k], lengths[k], reach)
+                    (domain.lower[k], lengths[k], reach * stretch)
                 } else {
                     (low[k], (high[k] - low[k]).max(reach), reach * stretch)
                 };
@@ -64,7 +64,7 @@ impl Grid {
                 grid.inverse_cell[k] = grid.cells[k] as f64 / length;
             }
             let count = grid.cells.iter().fold(1.0, |c, &m| c * m as f64);
-            if count <= 8.0 * n as f64 + 4096.0 || domain.periodic == [true; 3] {
+            if count <= 8.0 * n as f64 + 4096.0 {
                 return grid;
             }
             stretch *= 1.5;

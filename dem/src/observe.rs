@@ -5,6 +5,7 @@ use crate::grains::{SPHERE_INERTIA, vector};
 use crate::motion::{self, Pull};
 use crate::simulation::Simulation;
 use crate::snapshot::{ContactSample, GrainSample, Partner, Snapshot};
+use crate::state_hash::StateHash;
 use nalgebra::Vector3;
 
 impl Simulation {
@@ -200,6 +201,23 @@ impl Simulation {
         sum
     }
 
+    /// Angular momentum of the free grains about the origin, spins included, as the integrator holds
+    /// it: positions now, velocities half a step back (N m s). Without walls, gravity and periodic axes
+    /// it is conserved to round-off.
+    pub fn leapfrog_angular_momentum(&self) -> Vector3<f64> {
+        let mut sum = Vector3::zeros();
+        for i in (0..self.grains.len()).filter(|&i| !self.grains.is_fixed(i)) {
+            let (x, v, turn) = (
+                vector(&self.grains.place[i]),
+                vector(&self.grains.motion[i]),
+                vector(&self.grains.turn[i]),
+            );
+            let radius = self.grains.place[i][3];
+            sum += self.grains.mass[i] * (x.cross(&v) + SPHERE_INERTIA * radius * turn);
+        }
+        sum
+    }
+
     /// Hash of the bits of all positions, velocities, spins and springs, in the grains' own order.
     ///
     /// 64-bit FNV-1a, in hex. The same for any number of threads and after a restart.
@@ -208,7 +226,7 @@ impl Simulation {
         let n = self.grains.len();
         let mut by_id: Vec<usize> = (0..n).collect();
         by_id.sort_by_key(|&i| self.grains.id[i]);
-        let mut hash = Fnv::default();
+        let mut hash = StateHash::default();
         for i in by_id {
             for rows in [&self.grains.place, &self.grains.motion, &self.grains.turn] {
                 rows[i].iter().for_each(|x| hash.take(x.to_bits()));
@@ -239,23 +257,6 @@ impl Simulation {
         {
             c.history.iter().for_each(|h| hash.take(h.to_bits()));
         }
-        format!("{:016x}", hash.0)
-    }
-}
-
-/// FNV-1a on 64-bit words, byte by byte.
-struct Fnv(u64);
-
-impl Default for Fnv {
-    fn default() -> Self {
-        Fnv(0xcbf2_9ce4_8422_2325)
-    }
-}
-
-impl Fnv {
-    fn take(&mut self, word: u64) {
-        for byte in word.to_le_bytes() {
-            self.0 = (self.0 ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
-        }
+        hash.finish()
     }
 }

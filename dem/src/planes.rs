@@ -140,7 +140,7 @@ impl PlaneContacts {
             })
     }
 
-    /// Evaluates the law on all listed contacts; the largest overlap over twice the radius.
+    /// Evaluates the law on all listed contacts; the largest overlap over the radius.
     pub fn evaluate<I: Interaction>(
         &mut self,
         law: &I,
@@ -178,7 +178,7 @@ impl PlaneContacts {
             let wrench = law.wrench(&touch, &mut c.history, step);
             let torque = wrench.tangential.cross(normal).scale(arm);
             c.slot = [wrench.force, torque, wrench.moment].map(|v| [v.0[0], v.0[1], v.0[2], 0.0]);
-            deepest = deepest.max(0.5 * overlap * s[3]);
+            deepest = deepest.max(overlap * s[3]);
         }
         deepest
     }

@@ -34,7 +34,7 @@ pub enum Diverged {
          {timestep:e} s is too long, or the stiffness of {stiffness:e} N/m too low for the speeds"
     )]
     Overlap {
-        /// Overlap over twice the reduced radius.
+        /// Overlap over the harmonic mean radius.
         overlap: f64,
         /// When it was found (s).
         time: f64,
@@ -43,9 +43,22 @@ pub enum Diverged {
         /// k_n (N/m).
         stiffness: f64,
     },
+    /// Grains move against each other by more than the search can follow.
+    #[error(
+        "grains approached each other by more than {skin:e} m in the one step before t = {time:e} s: \
+         the time step of {timestep:e} s is too long for their speeds"
+    )]
+    Leap {
+        /// The list's skin (m).
+        skin: f64,
+        /// When it was found (s).
+        time: f64,
+        /// The step (s).
+        timestep: f64,
+    },
 }
 
-/// An overlap, over twice the reduced radius, that no run of ours means: grains half way through.
+/// An overlap, over the harmonic mean radius, that no run of ours means: grains half way through.
 const RUN_THROUGH: f64 = 1.0;
 
 /// Skin of the Verlet list, and reach beyond touching of the batches, in smallest-grain diameters.
@@ -165,7 +178,7 @@ impl Simulation {
         for _ in 0..steps {
             self.step()?;
         }
-        Ok(())
+        self.check()
     }
 
     fn step(&mut self) -> Result<(), Diverged> {
@@ -281,10 +294,17 @@ impl Simulation {
             .outdated(&self.planes, &list.rows, &list.travel, list.age);
         if walls || list.outdated(self.skin) {
             self.check()?;
+            // A list that does not outlive one step cannot promise that no contact was missed.
+            if self.list.age < 1.5 * self.timestep {
+                return Err(Diverged::Leap {
+                    skin: self.skin,
+                    time: self.time(),
+                    timestep: self.timestep,
+                });
+            }
             self.store_history();
             self.rebuild();
         } else if list.outdated_since(&self.reach.travel, self.reach.age, self.reach_skin) {
-            self.check()?;
             self.store_history();
             self.renew_reach();
         }
@@ -452,8 +472,8 @@ impl Simulation {
         self.grains.len()
     }
 
-    /// Largest overlap of any contact since the start, over twice its reduced radius
-    /// (the radius, for equal grains).
+    /// Largest overlap of any contact at any step since the start, over the harmonic mean of the two
+    /// radii (the radius, for equal grains and for walls).
     pub fn largest_overlap(&self) -> f64 {
         self.deepest
     }
