@@ -2,6 +2,7 @@
 //! the rheology fitted to them.
 
 mod plan;
+mod search;
 mod verdict;
 
 pub use plan::{Bracket, CampaignError, CampaignSpec, GuessedLaw};
@@ -11,6 +12,7 @@ use crate::calibration::thesis::{EstimatorFit, VelocityProfile, estimator_fits};
 use crate::calibration::{LocalPoint, MuIFit, Stress, fit_mu_i};
 use crate::incline::{Cost, InclineResult, InclineRun, InclineSpec, Purpose, Start};
 use rayon::prelude::*;
+use search::{bracket, search};
 use serde::{Deserialize, Serialize};
 use std::sync::atomic::{AtomicBool, Ordering};
 
@@ -42,9 +44,9 @@ pub enum CampaignEvent<'a> {
 pub struct CampaignResult {
     /// All runs: measured flows by rising slope, then the search for the stop, then for the onset.
     pub runs: Vec<InclineResult>,
-    /// Highest slope where a flow stops and lowest where it goes on (degrees).
+    /// Lowest slope where a flow goes on, and the highest below it where one stops (degrees).
     pub stop_bracket_degrees: Option<(f64, f64)>,
-    /// Highest slope where a bed stays at rest and lowest where it starts to flow (degrees).
+    /// Lowest slope where a bed starts to flow, and the highest below it where one stays at rest (degrees).
     pub onset_bracket_degrees: Option<(f64, f64)>,
     /// All points that the fits use.
     pub points: Vec<LocalPoint>,
@@ -147,8 +149,8 @@ pub fn evaluate(
     .map(|stress| fit_mu_i(&points, stress));
     let estimators = estimator_fits(&profiles);
     // A flow that was to be measured and stopped, or went on, tells about the stop as well.
-    let stop_bracket_degrees = bracket(stop_runs.iter().chain(&flows));
-    let onset_bracket_degrees = bracket(onset_runs.iter());
+    let stop = bracket(stop_runs.iter().chain(&flows));
+    let onset = bracket(onset_runs.iter());
     let mut cost = Cost::default();
     for run in flows.iter().chain(&stop_runs).chain(&onset_runs) {
         cost.steps += run.cost.steps;
@@ -162,8 +164,8 @@ pub fn evaluate(
         fit: &fits[0],
         fit_zz: &fits[1],
         estimators: &estimators,
-        stop: stop_bracket_degrees,
-        onset: onset_bracket_degrees,
+        stop: &stop,
+        onset: &onset,
     });
     let [fit, fit_zz, fit_slope] = fits.map(Result::ok);
     CampaignResult {
@@ -172,8 +174,8 @@ pub fn evaluate(
             .chain(stop_runs)
             .chain(onset_runs)
             .collect(),
-        stop_bracket_degrees,
-        onset_bracket_degrees,
+        stop_bracket_degrees: stop.ok(),
+        onset_bracket_degrees: onset.ok(),
         points,
         fit,
         fit_zz,
@@ -228,66 +230,4 @@ impl Watch<'_> {
         (self.events)(CampaignEvent::Finished(&result));
         Ok(result)
     }
-}
-
-/// Bisection for the slope where beds begin to flow, between a low and a high end that are run first. If an end
-/// is not what it should be, the search moves outward by the bracket's width, twice at most.
-fn search(
-    bracket: &Bracket,
-    run: &dyn Fn(f64) -> Result<InclineResult, CampaignError>,
-) -> Result<Vec<InclineResult>, CampaignError> {
-    let mut results = Vec::new();
-    let mut flows_at = |angle: f64| -> Result<bool, CampaignError> {
-        let result = run(angle)?;
-        let flows = result.flows();
-        results.push(result);
-        Ok(flows)
-    };
-    let width = bracket.high - bracket.low;
-    let (mut low, mut high) = (bracket.low, bracket.high);
-    let mut found = [false; 2];
-    for _ in 0..3 {
-        if flows_at(low)? {
-            (low, high, found[1]) = (low - width, low, true);
-        } else {
-            found[0] = true;
-            break;
-        }
-    }
-    while found[0] && !found[1] && high <= bracket.high + 2.0 * width && high < 80.0 {
-        if flows_at(high)? {
-            found[1] = true;
-        } else {
-            (low, high) = (high, high + width);
-        }
-    }
-    while found == [true, true] && high - low > bracket.resolution * (1.0 + 1e-9) {
-        let middle = 0.5 * (low + high);
-        if flows_at(middle)? {
-            high = middle;
-        } else {
-            low = middle;
-        }
-    }
-    results.sort_by(|a, b| a.slope_degrees.total_cmp(&b.slope_degrees));
-    Ok(results)
-}
-
-/// Highest slope below the lowest flow that does not flow, and that lowest flow above it.
-fn bracket<'a>(runs: impl Iterator<Item = &'a InclineResult>) -> Option<(f64, f64)> {
-    let (mut resting, mut flowing) = (Vec::new(), Vec::new());
-    for run in runs {
-        if run.flows() {
-            &mut flowing
-        } else {
-            &mut resting
-        }
-        .push(run.slope_degrees);
-    }
-    let low = resting.into_iter().fold(f64::NEG_INFINITY, f64::max);
-    let high = flowing
-        .into_iter()
-        .filter(|a| *a > low)
-        .fold(f64::INFINITY, f64::min);
-    (low.is_finite() && high.is_finite()).then_some((low, high))
 }

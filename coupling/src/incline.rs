@@ -391,6 +391,7 @@ impl InclineRun {
             outcome,
             steady: test,
             distance: self.distance,
+            diameter: self.spec.diameter,
             checks: profile.as_ref().map(|p| p.balance),
             height,
             points,

@@ -35,13 +35,16 @@ pub struct SteadyTest {
     pub trend: Trend,
     /// Where the start is cut (s).
     pub truncation_time: f64,
-    /// Mean after the cut.
+    /// Mean after the cut; 0 only if it is 0, the series is empty or holds a number that is not finite.
     pub mean: f64,
-    /// Standard error of the mean, correlation included.
+    /// Standard error of the mean, correlation included; 0 where the drift is not known.
     pub mean_error: f64,
-    /// Change over the series after the cut, by the fitted line, relative to the mean.
+    /// Were there samples enough, and a mean to compare with, for a drift? If not, the 0 in `drift` and
+    /// `drift_error` says nothing.
+    pub drift_known: bool,
+    /// Change over the series after the cut, by the fitted line, relative to the mean; 0 if not known.
     pub drift: f64,
-    /// Standard error of the drift.
+    /// Standard error of the drift; 0 if not known.
     pub drift_error: f64,
     /// Two-sided probability of such a drift by chance in a stationary series.
     pub p_value: f64,
@@ -55,6 +58,10 @@ pub struct SteadyTest {
 
 /// Below this many effective samples nothing is decided.
 const FEWEST_EFFECTIVE: f64 = 5.0;
+/// Below this many samples after the cut the drift is not known.
+const FEWEST_SAMPLES: usize = 20;
+/// Samples of a series that are always enough for a drift: the cut takes half of them at most.
+pub const ENOUGH_SAMPLES: usize = 2 * FEWEST_SAMPLES;
 /// Significance level of the drift.
 const LEVEL: f64 = 0.05;
 
@@ -68,6 +75,7 @@ pub fn steady_test(series: &[f64], interval: f64, tolerance: f64) -> SteadyTest 
         truncation_time: cut as f64 * interval,
         mean: 0.0,
         mean_error: 0.0,
+        drift_known: false,
         drift: 0.0,
         drift_error: 0.0,
         p_value: 1.0,
@@ -76,10 +84,14 @@ pub fn steady_test(series: &[f64], interval: f64, tolerance: f64) -> SteadyTest 
         tolerance,
     };
     let n = rest.len() as f64;
-    if rest.len() < 20 || rest.iter().any(|x| !x.is_finite()) {
+    let mean = rest.iter().sum::<f64>() / n;
+    if !mean.is_finite() {
         return test;
     }
-    let mean = rest.iter().sum::<f64>() / n;
+    test.mean = mean;
+    if rest.len() < FEWEST_SAMPLES {
+        return test;
+    }
     // Abscissa t = (k − middle)/n, so that the slope is the change over the whole rest.
     let t = |k: usize| (k as f64 - 0.5 * (n - 1.0)) / n;
     let tt: f64 = (0..rest.len()).map(|k| t(k) * t(k)).sum();
@@ -96,7 +108,6 @@ pub fn steady_test(series: &[f64], interval: f64, tolerance: f64) -> SteadyTest 
         .collect();
     let variance = residuals.iter().map(|r| r * r).sum::<f64>() / (n - 2.0);
     let tau = autocorrelation_time(&residuals);
-    test.mean = mean;
     test.effective_samples = n / tau;
     test.correlation_time = tau * interval;
     test.mean_error = (variance * tau / n).sqrt();
@@ -104,6 +115,11 @@ pub fn steady_test(series: &[f64], interval: f64, tolerance: f64) -> SteadyTest 
     let scale = if mean != 0.0 { mean.abs() } else { return test };
     test.drift = slope / scale;
     test.drift_error = slope_error / scale;
+    test.drift_known = test.drift.is_finite() && test.drift_error.is_finite();
+    if !test.drift_known {
+        (test.drift, test.drift_error) = (0.0, 0.0);
+        return test;
+    }
     let freedom = (test.effective_samples - 2.0).max(1.0);
     let Ok(student) = StudentsT::new(0.0, 1.0, freedom) else {
         return test;
@@ -267,6 +283,28 @@ mod tests {
         let short = ar1(&mut rng, 40, 0.9, 10.0, 1.0);
         assert_eq!(steady_test(&short, 0.1, 0.05).trend, Trend::Undecided);
         assert_eq!(steady_test(&[1.0; 7], 0.1, 0.05).trend, Trend::Undecided);
+    }
+
+    #[test]
+    fn too_few_samples_leave_a_mean_but_no_drift() {
+        let rising: Vec<f64> = (0..19).map(f64::from).collect();
+        let test = steady_test(&rising[10..], 0.1, 0.05);
+        assert!(!test.drift_known && test.mean > 10.0, "{test:?}");
+        assert!(!steady_test(&[0.0; 100], 0.1, 0.05).drift_known);
+        let empty = steady_test(&[], 0.1, 0.05);
+        assert!(!empty.drift_known && empty.mean == 0.0, "{empty:?}");
+        let broken = steady_test(&[f64::NAN; 100], 0.1, 0.05);
+        assert!(!broken.drift_known && broken.mean == 0.0, "{broken:?}");
+        // Wherever the cut falls, this many samples are enough.
+        let mut rng = ChaCha8Rng::seed_from_u64(5);
+        for extra in 0..10 {
+            let noise = ar1(&mut rng, ENOUGH_SAMPLES + extra, 0.9, 10.0, 1.0);
+            let late: Vec<f64> = (0..noise.len())
+                .map(|k| if k < noise.len() / 2 { 0.0 } else { 1.0 })
+                .collect();
+            assert!(steady_test(&noise, 0.1, 0.05).drift_known);
+            assert!(steady_test(&late, 0.1, 0.05).drift_known);
+        }
     }
 
     #[test]

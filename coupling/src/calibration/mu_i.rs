@@ -59,6 +59,9 @@ pub struct MuIFit {
     pub identified: bool,
     /// The same in words.
     pub identifiability: String,
+    /// Is it a law that a material can have: μ_s ≥ 0, μ_2 > μ_s, I_0 > 0, all finite? Nothing holds the fit to
+    /// that but I_0 > 0.
+    pub physical: bool,
 }
 
 /// φ = `intercept` − `slope` I.
@@ -254,8 +257,8 @@ pub fn fit_mu_i(points: &[LocalPoint], stress: Stress) -> Result<MuIFit, FitErro
         .fold(f64::INFINITY, f64::min);
     let high = points.iter().map(|p| p.inertial_number).fold(0.0, f64::max);
     let (solid_fraction, solid_fraction_error) = mean_between_runs(points, &by_run, runs);
-    let (identified, identifiability) =
-        identifiability(&p, [error(0), error(1), error(2)], [low, high], runs);
+    let (identified, identifiability) = identifiability(&p, &covariance, [low, high], runs);
+    let finite = p.iter().chain(covariance.iter()).all(|x| x.is_finite());
     Ok(MuIFit {
         stress,
         mu_s: p[0],
@@ -276,6 +279,7 @@ pub fn fit_mu_i(points: &[LocalPoint], stress: Stress) -> Result<MuIFit, FitErro
         solid_fraction_of_i: fit_solid_fraction(points).ok(),
         identified,
         identifiability,
+        physical: finite && p[0] >= 0.0 && p[1] > p[0] && p[2] > 0.0,
     })
 }
 
@@ -361,18 +365,26 @@ const UNKNOWN: f64 = 0.5;
 
 fn identifiability(
     p: &Vector3<f64>,
-    errors: [f64; 3],
+    covariance: &Matrix3<f64>,
     range: [f64; 2],
     runs: usize,
 ) -> (bool, String) {
     let mut reasons = Vec::new();
-    for (name, value, error) in [
-        ("mu_s", p[0], errors[0]),
-        ("mu_2", p[1], errors[1]),
-        ("i_0", p[2], errors[2]),
-        ("mu_2 - mu_s", p[1] - p[0], errors[0].hypot(errors[1])),
+    let c = |row: usize, column: usize| covariance[(row, column)];
+    for (name, value, variance) in [
+        ("mu_s", p[0], c(0, 0)),
+        ("mu_2", p[1], c(1, 1)),
+        ("i_0", p[2], c(2, 2)),
+        // The two ends of the law are correlated, and strongly where the data reach only one of them.
+        (
+            "mu_2 - mu_s",
+            p[1] - p[0],
+            c(0, 0) + c(1, 1) - 2.0 * c(0, 1),
+        ),
     ] {
-        if error.is_nan() || error >= UNKNOWN * value.abs() {
+        // Rounding may leave a difference of equals a little below 0.
+        let error = variance.max(0.0).sqrt();
+        if variance.is_nan() || error >= UNKNOWN * value.abs() {
             reasons.push(format!(
                 "{name} = {value:.3} ± {error:.3} is not known to 50 %"
             ));

@@ -58,8 +58,8 @@ pub struct CampaignSpec {
     pub search_time: f64,
     /// Inertial number at the start of the stop search; low, so that beds that stop do so soon.
     pub search_inertial_number: f64,
-    /// Largest drift of the mean velocity over the averaging time, relative, of flows whose points are used:
-    /// pairs (I, μ) are local and hold in a slow drift, though tan θ does not.
+    /// Largest drift of the mean velocity over the averaging time, relative and its standard error included, of
+    /// flows whose points are used: pairs (I, μ) are local and hold in a slow drift, though tan θ does not.
     pub usable_drift: f64,
 }
 
@@ -85,39 +85,6 @@ pub enum CampaignError {
 }
 
 impl CampaignSpec {
-    /// The short campaign of the moderate material: about 1.8·10⁹ grain-steps for the default bed of 1800
-    /// grains with steps of 5·10⁻⁴ √(d/g). `base` gives the bed, the law, d, g and the time step; its times are set
-    /// here.
-    pub fn short(mut base: InclineSpec) -> Self {
-        let unit = (base.diameter / base.gravity).sqrt();
-        base.relax_time = 20.0 * unit;
-        base.average_time = 30.0 * unit;
-        base.max_time = 52.0 * unit;
-        Self {
-            base,
-            published_material: Some("moderate".into()),
-            flow_angles_degrees: vec![28.0, 29.5, 31.0, 33.0, 35.0, 37.0],
-            guessed_law: GuessedLaw {
-                mu_s: 0.45,
-                mu_2: 0.95,
-                i_0: 0.6,
-            },
-            stop: Bracket {
-                low: 24.0,
-                high: 30.0,
-                resolution: 1.5,
-            },
-            onset: Bracket {
-                low: 28.0,
-                high: 36.0,
-                resolution: 2.0,
-            },
-            search_time: 35.0 * unit,
-            search_inertial_number: 0.06,
-            usable_drift: 0.25,
-        }
-    }
-
     /// Checks the campaign's numbers; those of its runs are checked when they start, the base here.
     ///
     /// # Errors
@@ -242,9 +209,13 @@ impl CampaignSpec {
         }
     }
 
-    /// May the points of this run enter the fit? It must have flowed without drifting far.
+    /// May the points of this run enter the fit? It must have flowed, and be known not to have drifted far.
     pub fn is_usable(&self, run: &InclineResult) -> bool {
-        run.profile.is_some() && run.flows() && run.steady.drift.abs() <= self.usable_drift
+        let test = &run.steady;
+        run.profile.is_some()
+            && run.flows()
+            && test.drift_known
+            && test.drift.abs() + test.drift_error <= self.usable_drift
     }
 
     /// Most grain-steps the campaign can take if no search has to move outward.

@@ -1,6 +1,7 @@
 //! Good enough or not, in words with figures.
 
 use super::CampaignSpec;
+use super::search::NoBracket;
 use crate::calibration::thesis::{Estimator, EstimatorFit, Row, published_row};
 use crate::calibration::{FitError, MuIFit};
 use crate::incline::{InclineResult, Outcome};
@@ -22,15 +23,15 @@ pub(super) struct Evidence<'a> {
     pub fit: &'a Result<MuIFit, FitError>,
     pub fit_zz: &'a Result<MuIFit, FitError>,
     pub estimators: &'a [EstimatorFit],
-    pub stop: Option<(f64, f64)>,
-    pub onset: Option<(f64, f64)>,
+    pub stop: &'a Result<(f64, f64), NoBracket>,
+    pub onset: &'a Result<(f64, f64), NoBracket>,
 }
 
 /// Root-mean-square residual, relative to μ, above which μ(I) does not describe the material.
 const LARGEST_MISFIT: f64 = 0.03;
 /// Largest |σ_zz/weight − 1| of a trustworthy flow.
 const LARGEST_WEIGHT_ERROR: f64 = 0.02;
-/// Overlap over radius above which grains are too soft for the limit of hard grains.
+/// Overlap over the harmonic mean of the radii above which grains are too soft for the limit of hard grains.
 const LARGEST_OVERLAP: f64 = 0.05;
 
 pub(super) fn judge(e: &Evidence) -> Verdict {
@@ -66,6 +67,10 @@ pub(super) fn judge(e: &Evidence) -> Verdict {
             }
             text.push(fit.identifiability.clone());
             good &= fit.identified;
+            if !fit.physical {
+                good = false;
+                text.push(unphysical(fit));
+            }
             text.push(format!(
                 "Errors are {:.1} times those of counting, because layers of one run are not independent.",
                 fit.error_scale
@@ -85,8 +90,10 @@ pub(super) fn judge(e: &Evidence) -> Verdict {
         ("A bed at rest starts to flow", e.onset),
     ] {
         text.push(match bracket {
-            Some((low, high)) => format!("{what} between {low:.2}° and {high:.2}°."),
-            None => format!("{what} at a slope outside those tried."),
+            Ok((low, high)) => format!("{what} between {low:.2}° and {high:.2}°."),
+            Err(why) => {
+                format!("{what} at a slope outside those tried: no bracket, because {why}.")
+            }
         });
     }
     let unit = (e.spec.base.diameter / e.spec.base.gravity).sqrt();
@@ -104,11 +111,32 @@ pub(super) fn judge(e: &Evidence) -> Verdict {
     }
 }
 
+/// Why no material has this law.
+fn unphysical(fit: &MuIFit) -> String {
+    let mut reasons = Vec::new();
+    if fit.mu_s < 0.0 {
+        reasons.push("friction would be negative at slow shear (mu_s below 0)");
+    }
+    if fit.mu_2 <= fit.mu_s {
+        reasons.push("friction would not rise with the shear rate (mu_2 not above mu_s)");
+    }
+    if fit.i_0 <= 0.0 {
+        reasons.push("the law would be singular (I_0 not above 0)");
+    }
+    if reasons.is_empty() {
+        reasons.push("a parameter or its error is not a finite number");
+    }
+    format!(
+        "No material has this law: {}; do not use it.",
+        reasons.join("; ")
+    )
+}
+
 fn judge_runs(e: &Evidence, good: &mut bool, text: &mut Vec<String>) {
     let measured = e.flows.len();
     if e.used < measured {
         text.push(format!(
-            "{} of {measured} flows left out (at rest, or drifting by more than {:.0} % while averaged).",
+            "{} of {measured} flows left out (at rest, or not known to drift by less than {:.0} % while averaged).",
             measured - e.used,
             100.0 * e.spec.usable_drift
         ));
@@ -152,8 +180,10 @@ fn judge_runs(e: &Evidence, good: &mut bool, text: &mut Vec<String>) {
     let overlap = used().map(|r| r.largest_overlap).fold(0.0, f64::max);
     if overlap > LARGEST_OVERLAP {
         text.push(format!(
-            "Grains overlap by up to {:.1} % of their radius: softer than hard grains.",
-            100.0 * overlap
+            "The largest overlap of any contact at any step since the start, the first moments of the flow \
+             included, is {:.1} % of the harmonic mean of the two radii (more than {:.0} %): these grains may be \
+             softer than the limit of hard grains.",
+            100.0 * overlap, 100.0 * LARGEST_OVERLAP
         ));
     }
 }

@@ -7,7 +7,8 @@ use serde::{Deserialize, Serialize};
 ///
 /// The error is the delete-one-block jackknife over 32 to 63 blocks in time, times √((1 + r)/(1 − r)), where r
 /// is what correlation neighbouring blocks still have. r is negative where a flow breathes: the pressure swings
-/// by tens of per cent with a period of about a block, about a mean that the weight holds fixed.
+/// by tens of per cent with a period of about a block, about a mean that the weight holds fixed. That is counted
+/// as r = 0: so few blocks do not tell a swing well enough to narrow an error by it, so there the error is wide.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct Estimate {
     /// The mean.
@@ -210,7 +211,7 @@ fn jackknife_error(without: &[f64]) -> f64 {
         .map(|w| (w[0] - mean) * (w[1] - mean))
         .sum();
     // The estimate of the correlation is low by about 1/b.
-    let r = (neighbours / squares + 1.0 / b).clamp(-0.6, 0.9);
+    let r = (neighbours / squares + 1.0 / b).clamp(0.0, 0.9);
     ((b - 1.0) / b * squares * (1.0 + r) / (1.0 - r)).sqrt()
 }
 

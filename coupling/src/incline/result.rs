@@ -85,6 +85,8 @@ pub struct InclineResult {
     pub steady: SteadyTest,
     /// Distance travelled downslope, mean over the grains (m).
     pub distance: f64,
+    /// Mean diameter of the grains d (m).
+    pub diameter: f64,
     /// Series of energy and mean velocity.
     pub series: Vec<SeriesPoint>,
     /// Averages, if the run came to averaging and still moved.
@@ -97,7 +99,7 @@ pub struct InclineResult {
     pub height: f64,
     /// Cost.
     pub cost: Cost,
-    /// Largest overlap over the radius.
+    /// Largest overlap of any contact at any step since the start, over the harmonic mean of the two radii.
     pub largest_overlap: f64,
     /// Hash of the last state's bits.
     pub state_hash: String,
@@ -108,17 +110,19 @@ const STOPPING_DRIFT: f64 = -0.5;
 
 impl InclineResult {
     /// Does the bed flow at this slope? A run whose time was over counts as a flow unless it was about to stop
-    /// (more than half of its mean speed lost over the second half); started from rest, it counts as a flow
-    /// only if it moved on by a diameter.
+    /// (more than half of its mean speed lost over the second half; a drift that is not known does not show
+    /// that). Started from rest, it counts as a flow only if it moved on by more than a diameter, and in an
+    /// onset search only if it was not left slowing down or undecided.
     pub fn flows(&self) -> bool {
+        let moved_on = self.distance > self.diameter;
+        let goes_on = !self.steady.drift_known || self.steady.drift > STOPPING_DRIFT;
         match (self.outcome, self.start) {
             (Outcome::Rest, _) => false,
-            (Outcome::Steady | Outcome::Accelerating, _) => true,
-            (Outcome::Decelerating | Outcome::Undecided, Start::Flow { .. }) => {
-                self.steady.drift > STOPPING_DRIFT
-            }
+            (Outcome::Steady | Outcome::Accelerating, Start::Flow { .. }) => true,
+            (Outcome::Steady | Outcome::Accelerating, Start::Rest) => moved_on,
+            (Outcome::Decelerating | Outcome::Undecided, Start::Flow { .. }) => goes_on,
             (Outcome::Decelerating | Outcome::Undecided, Start::Rest) => {
-                self.purpose == Purpose::Measure && self.steady.drift > STOPPING_DRIFT
+                self.purpose == Purpose::Measure && moved_on && goes_on
             }
         }
     }

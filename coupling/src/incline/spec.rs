@@ -1,6 +1,7 @@
 //! What an inclined-plane run starts from.
 
 use crate::coarse_graining::AveragerError;
+use crate::steady_state::ENOUGH_SAMPLES;
 use colluvium_dem::{ContactLaw, Diverged, Domain, Grain, Setup, SetupError, Threads};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
@@ -59,7 +60,7 @@ pub struct InclineSpec {
     pub timestep: f64,
     /// Least time before averaging begins, or before a search may end as flowing (s).
     pub relax_time: f64,
-    /// Averaging time (s).
+    /// Averaging time (s); of a measuring run, at least 40 samples long.
     pub average_time: f64,
     /// Longest time of the whole run (s); averaging begins `average_time` before it at the latest.
     pub max_time: f64,
@@ -163,6 +164,16 @@ impl InclineSpec {
             self.sample_every > 0,
             "at least 1 step",
         )?;
+        if self.purpose == Purpose::Measure {
+            // With fewer, whether the flow drifts while it is averaged would stay unknown.
+            let enough = ENOUGH_SAMPLES as f64 * self.sample_interval();
+            check(
+                "average_time",
+                self.average_time,
+                self.average_time >= enough * (1.0 - 1e-12),
+                "at least 40 times the time between samples",
+            )?;
+        }
         if let Start::Flow { inertial_number } = self.start {
             check(
                 "start.inertial_number",
