@@ -11,7 +11,7 @@ use serde::{Deserialize, Serialize};
 use crate::discretisation::{Discretisation, ThresholdPressure};
 use crate::error::{Error, require};
 use crate::grid::{DIMENSIONS, Grid};
-use crate::rheology::{Rheology, plane_strain_rate};
+use crate::rheology::{Rheology, strain_rate_norm};
 use crate::yield_step::{
     FlowState, PrimalDual, PrimalDualOptions, RegularisedOptions, RegularisedViscosity, Residuals,
     StepProblem, StepReport, YieldSolver,
@@ -350,9 +350,9 @@ impl<R: Rheology> Flow<R> {
                 continue;
             }
             total += point.weight;
-            let rate = plane_strain_rate(point.strain_rate(&self.state.u));
+            let rate = strain_rate_norm(point.strain_rate(&self.state.u));
             let yield_stress = self.rheology.threshold(0.0, pressure).stress;
-            if plane_strain_rate(*s) >= YIELDED * yield_stress {
+            if strain_rate_norm(*s) >= YIELDED * yield_stress {
                 yielded += point.weight;
                 if !self.rheology.is_well_posed(rate, pressure) {
                     ill_posed += point.weight;

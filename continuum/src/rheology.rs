@@ -45,21 +45,15 @@ pub trait Rheology {
         Self: Sized;
 }
 
-/// Strain rate γ̇ = √(2 D:D) (1/s) of the plane velocity gradient
-/// `gradient[i][j]` = ∂u_i/∂x_j, with D = (∇u + ∇uᵀ)/2, so that γ̇ = |du/dz| in simple shear.
+/// Strain rate γ̇ = √(2 D:D) (1/s) of an incompressible plane flow, D = (∇u + ∇uᵀ)/2, from its two
+/// components γ₁ = ∂u/∂x − ∂w/∂z and γ₂ = ∂u/∂z + ∂w/∂x: γ̇² = γ₁² + γ₂². In simple shear
+/// γ̇ = |du/dz|.
 ///
 /// Two other conventions are in use among codes, √(D:D) and √(½ D:D); they differ by factors √2
-/// and 2, so this is the only place where the norm is formed from a gradient.
-pub fn strain_rate_norm(gradient: [[f64; 2]; 2]) -> f64 {
-    let [[xx, xz], [zx, zz]] = gradient;
-    let shear = 0.5 * (xz + zx);
-    (2.0 * (xx * xx + zz * zz + 2.0 * shear * shear)).sqrt()
-}
-
-/// Strain rate γ̇ (1/s) from the two plane components γ₁ = ∂u/∂x − ∂w/∂z and γ₂ = ∂u/∂z + ∂w/∂x:
-/// γ̇² = γ₁² + γ₂², equal to [`strain_rate_norm`] where the flow is incompressible.
+/// and 2, so this is the only place where the norm is formed. The norm of the stress components
+/// ((σ_xx − σ_zz)/2, σ_xz) is the same function.
 #[inline]
-pub fn plane_strain_rate(components: [f64; 2]) -> f64 {
+pub fn strain_rate_norm(components: [f64; 2]) -> f64 {
     (components[0] * components[0] + components[1] * components[1]).sqrt()
 }
 
@@ -67,22 +61,27 @@ pub fn plane_strain_rate(components: [f64; 2]) -> f64 {
 mod tests {
     use super::*;
 
-    #[test]
-    fn strain_rate_is_the_slope_of_the_velocity_in_simple_shear() {
-        assert!((strain_rate_norm([[0.0, -3.5], [0.0, 0.0]]) - 3.5).abs() < 1e-15);
-        // Pure shear along the diagonals: u = x, w = −z, γ̇ = 2.
-        assert!((strain_rate_norm([[1.0, 0.0], [0.0, -1.0]]) - 2.0).abs() < 1e-15);
-        // A rigid rotation does not strain.
-        assert_eq!(strain_rate_norm([[0.0, 2.0], [-2.0, 0.0]]), 0.0);
+    /// γ₁ and γ₂ of a gradient `gradient[i][j]` = ∂u_i/∂x_j.
+    fn components([[xx, xz], [zx, zz]]: [[f64; 2]; 2]) -> [f64; 2] {
+        [xx - zz, xz + zx]
     }
 
     #[test]
-    fn plane_components_give_the_same_norm_without_divergence() {
+    fn strain_rate_is_the_slope_of_the_velocity_in_simple_shear() {
+        let rate = |gradient| strain_rate_norm(components(gradient));
+        assert!((rate([[0.0, -3.5], [0.0, 0.0]]) - 3.5).abs() < 1e-15);
+        // Pure shear along the diagonals: u = x, w = −z, γ̇ = 2.
+        assert!((rate([[1.0, 0.0], [0.0, -1.0]]) - 2.0).abs() < 1e-15);
+        // A rigid rotation does not strain.
+        assert_eq!(rate([[0.0, 2.0], [-2.0, 0.0]]), 0.0);
+    }
+
+    #[test]
+    fn the_norm_is_that_of_the_tensor_without_divergence() {
         let gradient = [[0.3, 1.1], [-0.4, -0.3]];
-        let components = [
-            gradient[0][0] - gradient[1][1],
-            gradient[0][1] + gradient[1][0],
-        ];
-        assert!((strain_rate_norm(gradient) - plane_strain_rate(components)).abs() < 1e-15);
+        let shear: f64 = 0.5 * (gradient[0][1] + gradient[1][0]);
+        let diagonal: f64 = gradient[0][0].powi(2) + gradient[1][1].powi(2);
+        let tensor = (2.0 * (diagonal + 2.0 * shear * shear)).sqrt();
+        assert!((strain_rate_norm(components(gradient)) - tensor).abs() < 1e-15);
     }
 }

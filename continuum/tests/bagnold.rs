@@ -68,9 +68,6 @@ fn second_order_and_ten_times_below_the_peer() {
     for (error, (cells, peer)) in errors.iter().zip(BASILISK_L2) {
         assert!(*error < 0.105 * peer, "{cells} cells: {error:e}");
     }
-    for (error, expected) in errors.iter().zip([7.23e-4, 1.86e-4, 4.76e-5, 1.22e-5]) {
-        assert!((error / expected - 1.0).abs() < 0.01, "{error:e}");
-    }
     for pair in errors.windows(2) {
         let order = (pair[0] / pair[1]).log2();
         assert!(order >= 1.9, "order {order}");
@@ -85,13 +82,9 @@ fn pressure_in_cells_spoils_the_accuracy() {
         threshold_pressure: ThresholdPressure::Cell,
         ..Options::default()
     };
-    for ((cells, peer), expected) in BASILISK_L2
-        .iter()
-        .zip([1.678e-2, 3.963e-3, 9.67e-4, 2.39e-4])
-    {
-        let error = solve_with(&reference(*cells), &options).velocity_error_l2_relative;
-        assert!((error / expected - 1.0).abs() < 0.01, "{error:e}");
-        assert!(error > 0.105 * peer);
+    for (cells, peer) in BASILISK_L2 {
+        let error = solve_with(&reference(cells), &options).velocity_error_l2_relative;
+        assert!(error > peer, "{cells} cells: {error:e}");
     }
 }
 

@@ -15,7 +15,7 @@ use super::{
 };
 use crate::discretisation::{COMPONENTS, Discretisation, QuadraturePoint};
 use crate::error::Error;
-use crate::rheology::{Rheology, plane_strain_rate};
+use crate::rheology::{Rheology, strain_rate_norm};
 
 /// Settings of [`PrimalDual`]; times and lengths in natural units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -275,7 +275,7 @@ impl PrimalDual {
         for (point, s) in points.iter().zip(&mut self.trial.s) {
             let (_, _, threshold) =
                 evaluate(problem.rheology, point, &self.trial.u, &self.trial.p, floor);
-            let size = plane_strain_rate(*s);
+            let size = strain_rate_norm(*s);
             if size > threshold.stress {
                 let shrink = threshold.stress / size;
                 s[0] *= shrink;
@@ -301,7 +301,7 @@ impl PrimalDual {
                 s[1] * rate - threshold.stress * gamma[1],
             ];
             let scale = rate * (threshold.stress + 1e-3);
-            stress = largest_or_nan(stress, plane_strain_rate(miss) / scale);
+            stress = largest_or_nan(stress, strain_rate_norm(miss) / scale);
         }
         Residuals {
             momentum: momentum_residual(problem, u_old, &self.trial, momentum),

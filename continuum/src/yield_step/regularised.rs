@@ -14,7 +14,7 @@ use super::{
 };
 use crate::discretisation::{COMPONENTS, Discretisation};
 use crate::error::{Error, require};
-use crate::rheology::{Rheology, plane_strain_rate};
+use crate::rheology::{Rheology, strain_rate_norm};
 
 /// Settings of [`RegularisedViscosity`].
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -87,7 +87,7 @@ impl RegularisedViscosity {
     fn evaluate_viscosity<R: Rheology>(&mut self, problem: &StepProblem<'_, R>) {
         let points = problem.discretisation.points();
         for (point, viscosity) in points.iter().zip(&mut self.viscosity) {
-            let rate = plane_strain_rate(point.strain_rate(&self.trial.u));
+            let rate = strain_rate_norm(point.strain_rate(&self.trial.u));
             let (pressure, _) = threshold_pressure(point.pressure(&self.trial.p));
             let stress = problem.rheology.threshold(rate, pressure).stress;
             // The comparison form of the minimum has no division by a strain rate of zero.
@@ -117,8 +117,8 @@ impl RegularisedViscosity {
                 s[0] - self.viscosity[q] * gamma[0],
                 s[1] - self.viscosity[q] * gamma[1],
             ];
-            let scale = self.viscosity[q] * plane_strain_rate(gamma) + 1e-3;
-            worst = largest_or_nan(worst, plane_strain_rate(miss) / scale);
+            let scale = self.viscosity[q] * strain_rate_norm(gamma) + 1e-3;
+            worst = largest_or_nan(worst, strain_rate_norm(miss) / scale);
         }
         worst
     }

@@ -34,18 +34,19 @@ pub struct LocalPoint {
 pub struct PointRules {
     /// Cut above the base (m); 3 d: the basal layer slips and is layered.
     pub base_cut: f64,
-    /// Cut below the surface (m); 2 d: p → 0 and grains saltate.
+    /// Cut below the surface (m); 4 d: p → 0, grains saltate, and |τ|/p falls off the law by up to 8 % in
+    /// the third and fourth layer (seen alike in LAMMPS).
     pub top_cut: f64,
     /// Solid fraction that marks the surface; 0.2 as in the thesis.
     pub surface_solid_fraction: f64,
 }
 
 impl PointRules {
-    /// Base 3 d, top 2 d, φ > 0.2.
+    /// Base 3 d, top 4 d, φ > 0.2.
     pub fn for_diameter(diameter: f64) -> Self {
         Self {
             base_cut: 3.0 * diameter,
-            top_cut: 2.0 * diameter,
+            top_cut: 4.0 * diameter,
             surface_solid_fraction: 0.2,
         }
     }
