@@ -1,18 +1,22 @@
 //! Calibration: a campaign of inclined-plane runs, the μ(I) law fitted to it, and the continuum
 //! with that law beside the grains.
 
+mod comparison;
 mod findings;
+mod material;
+
+pub use material::published_material;
 
 use crate::cost::Cost;
-use crate::failure::Failure;
+use crate::failure::{Failure, Resumes};
 use crate::interruption;
 use crate::progress::{Bar, Bars};
-use crate::report::calibration::{Campaign, Comparison, FrictionOf};
+use crate::report::calibration::Campaign;
 use crate::rheology_file::{FitRow, Provenance, RheologyFile};
-use crate::run::{self, RunOptions, bagnold, incline};
+use crate::run::{self, Ended, RunOptions, incline, precheck};
 use crate::run_directory::RunDirectory;
 use crate::scene::{InclineScene, Scene, SceneBody};
-use crate::summary::{Status, Summary};
+use crate::summary::Status;
 use colluvium_coupling::calibration::MuIFit;
 use colluvium_coupling::campaign::{
     Bracket, CampaignError, CampaignEvent, CampaignResult, CampaignSpec, GuessedLaw, run_campaign,
@@ -20,9 +24,8 @@ use colluvium_coupling::campaign::{
 use colluvium_coupling::incline::{InclineResult, Purpose};
 use colluvium_dem::Threads;
 use colluvium_dem::preparation::Bed;
+use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
-use std::ops::ControlFlow;
-use std::path::PathBuf;
 use std::sync::Mutex;
 use std::time::Instant;
 
@@ -33,8 +36,8 @@ pub const CAMPAIGN: &str = "campaign.json";
 /// The fitted law.
 pub const RHEOLOGY: &str = "rheology.toml";
 
-/// Runs the campaign of an incline scene and writes its directory; gives the directory's path.
-pub fn calibrate(scene: &Scene, options: &RunOptions) -> Result<PathBuf, Failure> {
+/// Runs the campaign of an incline scene and writes its directory.
+pub fn calibrate(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> {
     let SceneBody::Incline(body) = &scene.body else {
         return Err(Failure::Input(format!(
             "calibrate: `{}` is not an incline; allowed: incline-moderate, incline-gravel, incline-glass, or a scene file of one of these kinds",
@@ -42,44 +45,64 @@ pub fn calibrate(scene: &Scene, options: &RunOptions) -> Result<PathBuf, Failure
         )));
     };
     interruption::listen();
+    precheck::incline(scene, body)?;
+    let spec = campaign_spec(scene, body, &precheck::stand_in_bed(body));
+    precheck::campaign(scene, &spec)?;
     let threads = options.threads.unwrap_or_else(rayon::current_num_threads);
-    let directory = run::open_directory(scene, options)?;
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|error| Failure::Run(format!("cannot start {threads} threads: {error}")))?;
-    let done = finished_angles(&directory, options.resume)?;
-    let mut summary = Summary::begun(&scene.name, "calibrate");
-    directory.write_summary(&summary)?;
+    let (directory, before) = run::open_directory(scene, options, "calibrate")?;
+    if before.is_some_and(|s| s.status == Status::Done) {
+        return Ok(run::already_done(&directory));
+    }
+    let before = finished_angles(&directory, options.resume)?;
+    if options.resume {
+        directory.journal.note("resumed");
+    }
+    directory.mark_running()?;
     directory
         .journal
         .note(&format!("calibrate {} with {threads} threads", scene.name));
-    match pool.install(|| campaign(scene, body, &directory, &done, threads)) {
-        Ok(()) => Ok(directory.path().to_owned()),
-        Err(failure @ (Failure::Scene(_) | Failure::Input(_))) => {
-            directory.abandon();
-            Err(failure)
-        }
+    let start = Instant::now();
+    let wall_before = before.wall_s;
+    let done = run::pool(threads)
+        .and_then(|pool| pool.install(|| campaign(scene, body, &directory, before, threads)));
+    match done {
+        Ok(warnings) => Ok(Ended {
+            directory: directory.path().to_owned(),
+            already_done: false,
+            warnings,
+        }),
         Err(failure) => {
-            let interrupted = matches!(failure, Failure::Interrupted { .. });
-            summary.status = if interrupted {
-                Status::Interrupted
-            } else {
-                Status::Failed
-            };
-            summary.remarks.push(failure.to_string());
-            directory.journal.note(&failure.to_string());
-            directory.write_summary(&summary)?;
+            // All input was checked before the directory was made: whatever fails now is the run,
+            // and the angles that are finished stay.
+            let failure = failure.after_work();
+            directory.mark_ended(&failure, wall_before + start.elapsed().as_secs_f64())?;
             Err(failure)
         }
     }
 }
 
+/// The user's wish to stop, as a failure.
+fn stopped(directory: &RunDirectory) -> Failure {
+    Failure::Interrupted {
+        directory: directory.path().to_owned(),
+        resumes: Resumes::from_saved(directory.file(ANGLES).exists()),
+    }
+}
+
+/// Finished runs of a campaign, as they are saved.
+#[derive(Clone, Debug, Default, Serialize, Deserialize)]
+struct Angles {
+    /// Wall time of the parts that made them (s).
+    wall_s: f64,
+    /// The runs.
+    runs: Vec<InclineResult>,
+}
+
 /// The runs that an interrupted campaign had finished.
-fn finished_angles(directory: &RunDirectory, resume: bool) -> Result<Vec<InclineResult>, Failure> {
+fn finished_angles(directory: &RunDirectory, resume: bool) -> Result<Angles, Failure> {
     let path = directory.file(ANGLES);
     if !resume || !path.exists() {
-        return Ok(Vec::new());
+        return Ok(Angles::default());
     }
     let refuse = |why: String| {
         Failure::Input(format!(
@@ -88,12 +111,11 @@ fn finished_angles(directory: &RunDirectory, resume: bool) -> Result<Vec<Incline
         ))
     };
     let text = std::fs::read_to_string(&path).map_err(|error| refuse(error.to_string()))?;
-    let runs: Vec<InclineResult> =
-        serde_json::from_str(&text).map_err(|error| refuse(error.to_string()))?;
+    let angles: Angles = serde_json::from_str(&text).map_err(|error| refuse(error.to_string()))?;
     directory
         .journal
-        .note(&format!("{} runs were finished before", runs.len()));
-    Ok(runs)
+        .note(&format!("{} runs were finished before", angles.runs.len()));
+    Ok(angles)
 }
 
 fn campaign_spec(scene: &Scene, body: &InclineScene, bed: &Bed) -> CampaignSpec {
@@ -106,7 +128,7 @@ fn campaign_spec(scene: &Scene, body: &InclineScene, bed: &Bed) -> CampaignSpec 
     CampaignSpec {
         // Angles run side by side, each on one thread: no bit depends on their number.
         base: incline::spec(body, bed, Threads::Serial),
-        published_material: published_material(&scene.name).map(String::from),
+        published_material: published_material(scene).map(String::from),
         flow_angles_degrees: keys.flow_degrees.clone(),
         guessed_law: GuessedLaw {
             mu_s: keys.guess.mu_s,
@@ -121,21 +143,14 @@ fn campaign_spec(scene: &Scene, body: &InclineScene, bed: &Bed) -> CampaignSpec 
     }
 }
 
-/// The row of the thesis' Table 2.6 that a scene can be compared with.
-pub fn published_material(scene: &str) -> Option<&'static str> {
-    match scene {
-        "incline-moderate" => Some("moderate"),
-        "incline-gravel" => Some("gravel"),
-        _ => None,
-    }
-}
-
 /// Bars and files of a campaign under way; events come from several threads.
 struct Observer<'a> {
     directory: &'a RunDirectory,
     bars: Bars,
     shown: Mutex<BTreeMap<String, Bar>>,
-    finished: Mutex<Vec<InclineResult>>,
+    finished: Mutex<Angles>,
+    wall_before: f64,
+    start: Instant,
     unwritten: Mutex<Option<Failure>>,
 }
 
@@ -180,7 +195,8 @@ impl Observer<'_> {
             bar.finish(if result.flows() { "flows" } else { "rests" });
         }
         if let Ok(mut finished) = self.finished.lock() {
-            finished.push(result.clone());
+            finished.runs.push(result.clone());
+            finished.wall_s = self.wall_before + self.start.elapsed().as_secs_f64();
             let saved = serde_json::to_vec(&*finished)
                 .map_err(|error| Failure::Run(error.to_string()))
                 .and_then(|text| self.directory.write(ANGLES, &text));
@@ -204,13 +220,11 @@ fn campaign(
     scene: &Scene,
     body: &InclineScene,
     directory: &RunDirectory,
-    done: &[InclineResult],
+    before: Angles,
     threads: usize,
-) -> Result<(), Failure> {
+) -> Result<Vec<String>, Failure> {
     let start = Instant::now();
-    let stopped = || Failure::Interrupted {
-        directory: directory.path().to_owned(),
-    };
+    let stopped = || stopped(directory);
     let bar = Bar::new("settling the bed");
     let sharing = if threads > 1 {
         Threads::Rayon
@@ -228,40 +242,52 @@ fn campaign(
         directory,
         bars: Bars::default(),
         shown: Mutex::default(),
-        finished: Mutex::new(done.to_vec()),
+        finished: Mutex::new(before.clone()),
+        wall_before: before.wall_s,
+        start,
         unwritten: Mutex::default(),
     };
     let result = run_campaign(
         &spec,
-        done,
+        &before.runs,
         &|event| observer.see(event),
         interruption::flag(),
     );
     if let Ok(Some(failure)) = observer.unwritten.into_inner() {
         return Err(failure);
     }
-    let result = result.map_err(|error| match error {
+    let mut result = result.map_err(|error| match error {
         CampaignError::Stopped => stopped(),
         CampaignError::OutOfRange { .. } => Failure::Input(error.to_string()),
         CampaignError::Run(error) => incline::failure(error),
     })?;
-    let dem_wall = start.elapsed().as_secs_f64();
-    directory.journal.note(&result.verdict.text);
-    let comparisons = compare(body, &result, directory)?;
-    if let Some(fit) = &result.fit {
-        let file = rheology_file(scene, body, &result, fit);
-        directory.write(RHEOLOGY, file.to_toml().as_bytes())?;
+    // Grain-steps count the angles of earlier parts, so their time counts too.
+    let dem_wall = before.wall_s + start.elapsed().as_secs_f64();
+    let mut warnings = Vec::new();
+    match law_to_write(scene, body, &result) {
+        Ok(file) => directory.write(RHEOLOGY, file.to_toml().as_bytes())?,
+        Err(why) => {
+            let sentence = format!("No {RHEOLOGY} was written: {why}.");
+            result.verdict.good = false;
+            result.verdict.text = format!("{sentence} {}", result.verdict.text);
+            warnings.push(sentence);
+        }
     }
-    let record = Campaign {
+    directory.journal.note(&result.verdict.text);
+    let mut record = Campaign {
         result,
-        comparisons,
+        comparisons: Vec::new(),
         gravity: body.gravity,
         diameter: body.grains.diameter,
     };
-    let text = serde_json::to_vec(&record).map_err(|error| Failure::Run(error.to_string()))?;
-    directory.write(CAMPAIGN, &text)?;
+    // The grains' results first: the comparison must not put them at risk.
+    write_record(directory, &record)?;
+    let (comparisons, remarks) = comparison::compare(body, &record.result, directory)?;
+    record.comparisons = comparisons;
+    write_record(directory, &record)?;
 
     let mut summary = findings::summarise(scene, &record);
+    summary.remarks.extend(remarks);
     summary.model = incline::model(body, &bed);
     let grain_steps = record.result.cost.grain_steps + bed.report.grain_steps;
     summary.cost = Cost::measured(dem_wall, threads, grain_steps, 0);
@@ -274,7 +300,38 @@ fn campaign(
             tables,
             grains: None,
         },
-    )
+    )?;
+    Ok(warnings)
+}
+
+fn write_record(directory: &RunDirectory, record: &Campaign) -> Result<(), Failure> {
+    let text = serde_json::to_vec(record).map_err(|error| Failure::Run(error.to_string()))?;
+    directory.write(CAMPAIGN, &text)
+}
+
+/// The fitted law as a file, or why it cannot be one.
+fn law_to_write(
+    scene: &Scene,
+    body: &InclineScene,
+    result: &CampaignResult,
+) -> Result<RheologyFile, String> {
+    let Some(fit) = &result.fit else {
+        return Err("no law could be fitted".into());
+    };
+    let numbers = [fit.mu_s, fit.mu_2, fit.i_0];
+    let physical = numbers.iter().all(|x| x.is_finite())
+        && fit.mu_s >= 0.0
+        && fit.mu_2 > fit.mu_s
+        && fit.i_0 > 0.0;
+    if !physical {
+        return Err(format!(
+            "the fit is unphysical: mu_s = {:.4}, mu_2 = {:.4}, i_0 = {:.4}; allowed: 0 <= mu_s < mu_2, i_0 > 0",
+            fit.mu_s, fit.mu_2, fit.i_0
+        ));
+    }
+    let file = rheology_file(scene, body, result, fit);
+    file.check()?;
+    Ok(file)
 }
 
 fn rheology_file(
@@ -283,6 +340,10 @@ fn rheology_file(
     result: &CampaignResult,
     fit: &MuIFit,
 ) -> RheologyFile {
+    // Runs at rest or drifting are left out of the fit.
+    let mut flow_degrees: Vec<f64> = result.points.iter().map(|p| p.slope_degrees).collect();
+    flow_degrees.sort_by(f64::total_cmp);
+    flow_degrees.dedup();
     RheologyFile {
         mu_s: fit.mu_s,
         mu_s_error: Some(fit.mu_s_error),
@@ -295,6 +356,8 @@ fn rheology_file(
         solid_fraction_error: Some(fit.solid_fraction_error),
         grain_density: Some(body.grains.density),
         valid_i: Some(fit.valid_i),
+        identified: Some(fit.identified),
+        good: Some(result.verdict.good),
         covariance: Some(fit.covariance),
         mu_zz: result.fit_zz.as_ref().map(|f| FitRow {
             mu_s: f.mu_s,
@@ -307,87 +370,10 @@ fn rheology_file(
         provenance: Some(Provenance {
             version: env!("CARGO_PKG_VERSION").into(),
             scene: scene.name.clone(),
-            flow_degrees: body.calibration.flow_degrees.clone(),
+            flow_degrees,
             seed: body.seed,
             friction: "|tau|/p, p = trace/3".into(),
             verdict: result.verdict.text.clone(),
         }),
     }
-}
-
-/// Runs the continuum with the fitted laws at the angles of `calibration.compare_degrees`.
-fn compare(
-    body: &InclineScene,
-    result: &CampaignResult,
-    directory: &RunDirectory,
-) -> Result<Vec<Comparison>, Failure> {
-    let mut comparisons = Vec::new();
-    let fits = [
-        (FrictionOf::Pressure, &result.fit),
-        (FrictionOf::NormalStress, &result.fit_zz),
-    ];
-    for angle in &body.calibration.compare_degrees {
-        let run = result.runs.iter().find(|r| {
-            r.purpose == Purpose::Measure
-                && (r.slope_degrees - angle).abs() < 1e-9
-                && r.profile.is_some()
-        });
-        let Some(run) = run else {
-            directory.journal.note(&format!(
-                "no flow was measured at {angle} degrees: not compared"
-            ));
-            continue;
-        };
-        for (friction, fit) in fits {
-            let Some(fit) = fit else { continue };
-            if angle.to_radians().tan() >= fit.mu_2 {
-                directory.journal.note(&format!(
-                    "{angle} degrees lies above atan(mu_2) = {:.3}: not compared",
-                    fit.mu_2
-                ));
-                continue;
-            }
-            let settings = layer_settings(body, fit, *angle, run.height);
-            let scene = Scene::load("bagnold", &settings)?;
-            let SceneBody::Bagnold(layer) = &scene.body else {
-                continue;
-            };
-            let (solution, wall_s) = bagnold::solve(layer, &mut |_| ControlFlow::Continue(()))
-                .map_err(bagnold::failure)?;
-            let inertial_number = bagnold::case(layer)
-                .rheology
-                .inertial_number_at(angle.to_radians().tan());
-            comparisons.push(Comparison {
-                slope_degrees: *angle,
-                friction,
-                inertial_number,
-                inside_valid_i: (fit.valid_i[0]..=fit.valid_i[1]).contains(&inertial_number),
-                velocity_error: solution.velocity_error_l2_relative,
-                wall_s,
-                z: solution.z,
-                u: solution.u,
-                p: solution.p,
-                exact_u: solution.exact_u,
-            });
-        }
-    }
-    Ok(comparisons)
-}
-
-/// The continuum layer that stands beside a flow of grains.
-fn layer_settings(body: &InclineScene, fit: &MuIFit, angle: f64, depth: f64) -> Vec<String> {
-    // TOML wants a point or an exponent in a number that is not whole; `{:e}` always gives one.
-    let real = |key: &str, value: f64| format!("{key}={value:e}");
-    vec![
-        real("slope_degrees", angle),
-        real("depth", depth),
-        real("gravity", body.gravity),
-        real("rheology.mu_s", fit.mu_s.max(0.0)),
-        real("rheology.mu_2", fit.mu_2),
-        real("rheology.i_0", fit.i_0),
-        real("rheology.diameter", body.grains.diameter),
-        real("rheology.solid_fraction", fit.solid_fraction),
-        real("rheology.grain_density", body.grains.density),
-        format!("grid.cells={}", body.calibration.compare_cells),
-    ]
 }

@@ -5,7 +5,7 @@ use crate::failure::Failure;
 use crate::pareto;
 use crate::plan;
 use crate::report;
-use crate::run::{self, RunOptions};
+use crate::run::{self, Ended, RunOptions};
 use crate::scene::{self, Scene};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
@@ -15,7 +15,7 @@ use std::path::PathBuf;
 #[command(name = "colluvium", version, about, max_term_width = 100)]
 #[command(
     after_help = "Exit status: 0 done, 1 run failed, 2 bad input (nothing written), \
-                        130 interrupted (checkpoint written, --resume goes on)."
+                        130 interrupted (the message says what --resume does)."
 )]
 pub struct CommandLine {
     #[command(subcommand)]
@@ -159,12 +159,10 @@ pub fn execute(line: CommandLine) -> Result<(), Failure> {
         }
         Command::Plan { scene } => print(plan::plan(&scene.load()?)?.trim_end()),
         Command::Run { scene, how } => {
-            let directory = run::run(&scene.load()?, &how.options())?;
-            print(&report::digest(&directory)?);
+            say(&run::run(&scene.load()?, &how.options())?)?;
         }
         Command::Calibrate { scene, how } => {
-            let directory = calibrate::calibrate(&scene.load()?, &how.options())?;
-            print(&report::digest(&directory)?);
+            say(&calibrate::calibrate(&scene.load()?, &how.options())?)?;
         }
         Command::Pareto {
             scene,
@@ -187,6 +185,18 @@ pub fn execute(line: CommandLine) -> Result<(), Failure> {
             print(&text);
         }
     }
+    Ok(())
+}
+
+/// Tells what a run has come to.
+fn say(ended: &Ended) -> Result<(), Failure> {
+    for warning in &ended.warnings {
+        eprintln!("colluvium: {warning}");
+    }
+    if ended.already_done {
+        print("already done: nothing to resume");
+    }
+    print(&report::digest(&ended.directory)?);
     Ok(())
 }
 

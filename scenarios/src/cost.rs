@@ -9,7 +9,8 @@ pub struct Cost {
     pub wall_s: f64,
     /// Threads.
     pub threads: usize,
-    /// Free grains times steps.
+    /// Steps times all grains, the fixed ones of a base included (as LAMMPS counts atoms), those of
+    /// settling a bed included.
     pub grain_steps: u64,
     /// Grain-steps per second.
     pub grain_steps_per_s: f64,

@@ -1,6 +1,6 @@
 //! Error against cost: one scene run with several values of one key.
 
-use crate::failure::Failure;
+use crate::failure::{Failure, Resumes};
 use crate::report;
 use crate::run::{self, RunOptions};
 use crate::run_directory::{self, RunDirectory};
@@ -8,6 +8,7 @@ use crate::scene::{Scene, SceneBody, SceneError};
 use crate::summary::{Quantity, Status, Summary};
 use crate::table::Table;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 /// A scene, the values of one key, and what to compare with.
 #[derive(Clone, Debug)]
@@ -53,14 +54,24 @@ impl Comparison {
         let variants = values
             .iter()
             .map(|value| {
-                let variant = scene.with(&[format!("{key}={value}")])?;
+                let variant = scene.with(&[format!("{key}={value}")], "--vary")?;
                 Ok(((*value).to_owned(), variant))
             })
             .collect::<Result<Vec<_>, SceneError>>()?;
+        for (n, (value, variant)) in variants.iter().enumerate() {
+            let twin = variants[..n].iter().find(|(before, other)| {
+                folder_name(&key, before) == folder_name(&key, value) || other == variant
+            });
+            if let Some((before, _)) = twin {
+                return Err(Failure::Input(format!(
+                    "--vary {key}: the values {before} and {value} are the same run; allowed: each value once"
+                )));
+            }
+        }
         let reference = if reference.is_empty() {
             None
         } else {
-            Some(scene.with(reference)?)
+            Some(scene.with(reference, "--reference")?)
         };
         if reference.is_none() && !has_exact_solution(&scene) {
             return Err(Failure::Input(format!(
@@ -81,16 +92,30 @@ impl Comparison {
         crate::interruption::listen();
         let name = format!("{}-pareto", self.scene.name);
         let place = run_directory::place(out.as_deref(), &name);
-        let directory = RunDirectory::create(&place, &self.scene)?;
-        let made = self.run_all(&directory, threads);
-        let rows = match made {
-            Ok(rows) => rows,
-            Err(failure @ (Failure::Scene(_) | Failure::Input(_))) => {
-                directory.abandon();
-                return Err(failure);
+        for scene in self.variants.iter().map(|(_, s)| s).chain(&self.reference) {
+            run::check(scene)?;
+        }
+        let directory = RunDirectory::create(&place, &self.scene, "pareto")?;
+        let start = Instant::now();
+        self.finish(&directory, threads).map_err(|failure| {
+            // A comparison has no state of its own to go on from.
+            let failure = match failure.after_work() {
+                Failure::Interrupted { .. } => Failure::Interrupted {
+                    directory: directory.path().to_owned(),
+                    resumes: Resumes::Never,
+                },
+                other => other,
+            };
+            match directory.mark_ended(&failure, start.elapsed().as_secs_f64()) {
+                Ok(()) => failure,
+                Err(unwritten) => unwritten,
             }
-            Err(failure) => return Err(failure),
-        };
+        })
+    }
+
+    /// Makes the runs, writes table, summary and report.
+    fn finish(&self, directory: &RunDirectory, threads: Option<usize>) -> Result<String, Failure> {
+        let rows = self.run_all(directory, threads)?;
         let table = self.table(&rows);
         directory.write_table(&table)?;
         let mut summary = Summary::begun(&self.scene.name, "pareto");
@@ -102,6 +127,12 @@ impl Comparison {
             .remarks
             .push(format!("{} against {}", self.key, self.compared_with()));
         for row in &rows {
+            if !row.error.is_finite() {
+                summary.remarks.push(format!(
+                    "No error at {} = {}: the run, or what it is compared with, has no value to compare.",
+                    self.key, row.value
+                ));
+            }
             let label = format!("error at {} = {}", self.key, row.value);
             summary.put(
                 &label,
@@ -140,6 +171,7 @@ impl Comparison {
                     resume: false,
                 },
             )
+            .map(|ended| ended.directory)
         };
         let reference = match &self.reference {
             Some(scene) => Some(one("reference", scene)?),
@@ -206,9 +238,14 @@ impl Comparison {
             let order = row
                 .order
                 .map_or_else(|| "–".to_owned(), |o| format!("{o:.3}"));
+            let error = if row.error.is_finite() {
+                format!("{:.4e}", row.error)
+            } else {
+                "none".to_owned()
+            };
             text.push_str(&format!(
-                "{:>width$}  {:>12.4e}  {:>8}  {:>10.4}  {:>14}\n",
-                row.value, row.error, order, row.wall_s, row.steps
+                "{:>width$}  {:>12}  {:>8}  {:>10.4}  {:>14}\n",
+                row.value, error, order, row.wall_s, row.steps
             ));
         }
         text.push_str(&format!("error: {}", self.compared_with()));

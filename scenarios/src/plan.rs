@@ -2,6 +2,7 @@
 
 use crate::failure::Failure;
 use crate::run;
+use crate::run::step::Step;
 use crate::scene::{BagnoldScene, ImpactScene, InclineScene, InclineStart, Scene, SceneBody};
 use colluvium_coupling::incline::{InclineRun, InclineSpec};
 use colluvium_dem::Threads;
@@ -64,7 +65,10 @@ fn measured_rate(scene: &InclineScene) -> Option<f64> {
 fn incline(scene: &Scene, body: &InclineScene) -> Result<String, Failure> {
     let mut lines = Lines::default();
     let law = run::incline::law(body);
-    let step = run::incline::step(body);
+    let Step {
+        seconds: step,
+        limit: step_limit,
+    } = run::incline::step(body);
     let grains = body.free_grains();
     let [length, width] = body.floor_edges();
     let mass = body.mean_mass();
@@ -119,7 +123,7 @@ fn incline(scene: &Scene, body: &InclineScene) -> Result<String, Failure> {
         "time step",
         &format!(
             "{step:.4e} s: {}; {:.0} % of the stability limit of the smallest grain on one spring, {limit:.3e} s",
-            run::incline::step_limit(body),
+            step_limit,
             100.0 * step / limit
         ),
     );
@@ -129,7 +133,10 @@ fn incline(scene: &Scene, body: &InclineScene) -> Result<String, Failure> {
         "steps",
         &format!("{least:.3e} if steady after time.relax, at most {most:.3e}"),
     );
-    let work = least * grains as f64;
+    // All grains count, the fixed base too: it has about one on each square diameter.
+    let base = length * width / body.grains.diameter.powi(2);
+    let moved = grains as f64 + base;
+    let work = least * moved;
     match measured_rate(body) {
         Some(rate) => {
             lines.say(
@@ -142,9 +149,9 @@ fn incline(scene: &Scene, body: &InclineScene) -> Result<String, Failure> {
                 "cost",
                 &format!(
                     "{work:.3e} to {:.3e} grain-steps: {:.0} s to {:.0} s on one thread, and the settling of the bed",
-                    most * grains as f64,
+                    most * moved,
                     work / rate,
-                    most * grains as f64 / rate
+                    most * moved / rate
                 ),
             );
         }
@@ -223,6 +230,9 @@ fn bagnold(body: &BagnoldScene) -> String {
             lines.say("warning", &remark);
         }
     }
+    for remark in body.law_remarks() {
+        lines.say("warning", &remark);
+    }
     let unit = (body.depth / body.gravity).sqrt();
     lines.say(
         "time step",
@@ -262,20 +272,11 @@ fn impact(scene: &Scene, body: &ImpactScene) -> String {
             100.0 * body.speed * (impact.reduced_mass / body.stiffness).sqrt() / body.radius
         ),
     );
-    let step = impact.setup.timestep;
-    lines.say(
-        "time step",
-        &format!(
-            "{step:.4e} s: contact time over steps_per_contact = {}",
-            body.steps_per_contact
-        ),
-    );
+    let step = impact.step.seconds;
+    lines.say("time step", &format!("{step:.4e} s: {}", impact.step.limit));
     lines.say(
         "steps",
-        &format!(
-            "{:.0}, well under a second per million",
-            (impact.duration / step).ceil()
-        ),
+        &format!("{:.0}, well under a second per million", impact.steps()),
     );
     lines.0
 }

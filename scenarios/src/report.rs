@@ -7,6 +7,7 @@ mod sections;
 
 use crate::failure::Failure;
 use crate::run_directory::{REPORT, SCENE, SUMMARY, write_in_place};
+use crate::scene::Scene;
 use crate::summary::{Quantity, Status, Summary};
 use crate::table::Table;
 use maud::{Markup, html};
@@ -36,6 +37,11 @@ impl Record {
         })
     }
 
+    /// The resolved scene, if it can still be read.
+    pub fn resolved(&self) -> Option<Scene> {
+        Scene::from_text(&self.scene, SCENE).ok()
+    }
+
     /// A table of the run, if it is there.
     pub fn table(&self, name: &str) -> Option<Table> {
         Table::from_csv(&self.path.join(format!("{name}.csv"))).ok()
@@ -53,12 +59,6 @@ pub fn read_summary(path: &Path) -> Result<Summary, Failure> {
     })?;
     serde_json::from_str(&text)
         .map_err(|error| Failure::Input(format!("{}: {error}", file.display())))
-}
-
-/// Whether a summary says that the run is done.
-pub fn is_done(summary: &Path) -> bool {
-    let text = std::fs::read_to_string(summary).unwrap_or_default();
-    serde_json::from_str::<Summary>(&text).is_ok_and(|s| s.status == Status::Done)
 }
 
 /// Writes `report.html` into a run directory.

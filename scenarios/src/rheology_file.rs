@@ -1,8 +1,8 @@
 //! `rheology.toml`: a μ(I) law with its errors, its validity and its provenance.
 
-use crate::scene::SceneError;
+use crate::scene::{SceneError, check_continuum_keys};
 use serde::{Deserialize, Serialize};
-use std::path::Path;
+use std::path::{Path, PathBuf};
 use toml::{Table, Value};
 
 /// Keys of a scene that a rheology file takes the place of.
@@ -14,6 +14,8 @@ pub const ALTERNATIVES: &[&[&str]] = &[
     &["rheology.file", "rheology.solid_fraction"],
     &["rheology.file", "rheology.grain_density"],
     &["rheology.file", "rheology.valid_i"],
+    &["rheology.file", "rheology.identified"],
+    &["rheology.file", "rheology.good"],
     &["rheology.file", "rheology.source"],
 ];
 
@@ -48,6 +50,12 @@ pub struct RheologyFile {
     /// Inertial numbers between which the law was measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub valid_i: Option<[f64; 2]>,
+    /// Whether the data determine all three parameters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub identified: Option<bool>,
+    /// Whether the law was judged fit to feed a continuum within `valid_i`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub good: Option<bool>,
     /// Covariance of (mu_s, mu_2, i_0).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub covariance: Option<[[f64; 3]; 3]>,
@@ -83,7 +91,7 @@ pub struct Provenance {
     pub version: String,
     /// The scene.
     pub scene: String,
-    /// Angles of the runs the fit uses (degrees).
+    /// Slopes of the runs whose points the fit uses (degrees).
     pub flow_degrees: Vec<f64>,
     /// Seed of the bed.
     pub seed: u64,
@@ -108,7 +116,8 @@ impl RheologyFile {
         Ok(law)
     }
 
-    fn check(&self) -> Result<(), String> {
+    /// Says what would make a scene refuse the file; with its range for each number.
+    pub fn check(&self) -> Result<(), String> {
         let least = |key: &str, value: f64, above: f64| {
             if value.is_finite() && value > above {
                 Ok(())
@@ -149,7 +158,10 @@ impl RheologyFile {
                 "key `valid_i` = [{low}, {high}] is not allowed; allowed: [low, high] with 0 <= low < high"
             ));
         }
-        Ok(())
+        // The ranges of the scene's own keys, so that what is written here can be read there.
+        let mut table = Table::new();
+        table.insert("rheology".into(), Value::Table(self.scene_keys("a fit")));
+        check_continuum_keys(&table, "as a scene").map_err(|error| error.to_string())
     }
 
     /// The file's text.
@@ -177,21 +189,49 @@ impl RheologyFile {
         if let Some(range) = self.valid_i {
             put("valid_i", Value::Array(range.map(Value::Float).to_vec()));
         }
+        for (key, value) in [("identified", self.identified), ("good", self.good)] {
+            if let Some(value) = value {
+                put(key, Value::Boolean(value));
+            }
+        }
         put("source", Value::String(source.to_owned()));
         keys
     }
 }
 
-/// Puts the numbers of the file in the place of `rheology.file`.
+/// Puts the numbers of the file in the place of `rheology.file`; gives the file's path.
 ///
 /// The resolved scene then stands alone: it can be run again when the file has gone.
-pub fn resolve(table: &mut Table) -> Result<(), SceneError> {
+pub fn resolve(table: &mut Table) -> Result<Option<PathBuf>, SceneError> {
     let Some(Value::Table(rheology)) = table.get_mut("rheology") else {
-        return Ok(());
+        return Ok(None);
     };
-    if let Some(Value::String(path)) = rheology.remove("file") {
-        let law = RheologyFile::read(Path::new(&path))?;
-        rheology.extend(law.scene_keys(&path));
+    let Some(Value::String(path)) = rheology.remove("file") else {
+        return Ok(None);
+    };
+    let law = RheologyFile::read(Path::new(&path))?;
+    rheology.extend(law.scene_keys(&path));
+    Ok(Some(PathBuf::from(path)))
+}
+
+/// Removes from a layer what it says about its law where the layer above gives other numbers: the
+/// range and the verdict belong to the fit, the source to all its numbers.
+pub fn drop_stale_notes(below: &mut Table, above: &Table) {
+    let Some(Value::Table(above)) = above.get("rheology") else {
+        return;
+    };
+    let Some(Value::Table(below)) = below.get_mut("rheology") else {
+        return;
+    };
+    let law = ["mu_s", "mu_2", "i_0"];
+    let grains = ["diameter", "solid_fraction", "grain_density"];
+    let changes = |keys: &[&str]| keys.iter().any(|k| above.contains_key(*k));
+    if changes(&law) {
+        for key in ["valid_i", "identified", "good"] {
+            below.remove(key);
+        }
     }
-    Ok(())
+    if changes(&law) || changes(&grains) {
+        below.remove("source");
+    }
 }

@@ -3,9 +3,11 @@
 pub mod bagnold;
 pub mod impact;
 pub mod incline;
+pub mod precheck;
+pub mod step;
 
 use crate::checkpoint::{self, Checkpoint};
-use crate::failure::Failure;
+use crate::failure::{Failure, Resumes};
 use crate::report;
 use crate::results_file;
 use crate::run_directory::{self, RunDirectory};
@@ -41,6 +43,17 @@ pub struct Findings {
     pub grains: Option<Table>,
 }
 
+/// How a run that ended well left things.
+#[derive(Clone, Debug, PartialEq, Eq)]
+pub struct Ended {
+    /// The directory.
+    pub directory: PathBuf,
+    /// It was done before: nothing was computed now.
+    pub already_done: bool,
+    /// What the user has to know beyond the summary.
+    pub warnings: Vec<String>,
+}
+
 /// A run under way: its directory, its clock and its checkpoints.
 #[derive(Debug)]
 pub struct Under<'a> {
@@ -55,12 +68,24 @@ pub struct Under<'a> {
     start: Instant,
     wall_before: f64,
     last_checkpoint: Instant,
+    /// Whether the state is there and work may begin: until then a resumed run writes nothing.
+    begun: bool,
 }
 
 impl Under<'_> {
     /// Wall time, parts before a restart included (s).
     pub fn wall_s(&self) -> f64 {
         self.wall_before + self.start.elapsed().as_secs_f64()
+    }
+
+    /// Says that the start, or the state to go on from, was accepted: from here on the directory is
+    /// this run's, and a failure is one of the run and not of the input.
+    pub fn begin(&mut self) -> Result<(), Failure> {
+        if self.resumed.is_some() {
+            self.directory.journal.note("resumed");
+        }
+        self.begun = true;
+        self.directory.mark_running()
     }
 
     /// Writes a checkpoint if one is due or the user asked to stop; the latter ends the run.
@@ -97,12 +122,20 @@ impl Under<'_> {
     pub fn interrupted(&self) -> Failure {
         Failure::Interrupted {
             directory: self.directory.path().to_owned(),
+            resumes: Resumes::from_saved(self.directory.file(run_directory::CHECKPOINT).exists()),
         }
     }
 }
 
-/// Opens or makes the directory of a run.
-pub fn open_directory(scene: &Scene, options: &RunOptions) -> Result<RunDirectory, Failure> {
+/// Opens or makes the directory of a run; for one that goes on, also gives its summary.
+///
+/// Everything that can be checked without computing has to be checked before: an earlier run that
+/// stands there is removed.
+pub fn open_directory(
+    scene: &Scene,
+    options: &RunOptions,
+    command: &'static str,
+) -> Result<(RunDirectory, Option<Summary>), Failure> {
     if options.resume {
         let Some(out) = &options.out else {
             return Err(Failure::Input(
@@ -110,24 +143,49 @@ pub fn open_directory(scene: &Scene, options: &RunOptions) -> Result<RunDirector
                     .into(),
             ));
         };
-        RunDirectory::reopen(out, scene)
+        let (directory, summary) = RunDirectory::reopen(out, scene, command)?;
+        Ok((directory, Some(summary)))
     } else {
-        RunDirectory::create(
-            &run_directory::place(options.out.as_deref(), &scene.name),
-            scene,
-        )
+        let place = run_directory::place(options.out.as_deref(), &scene.name);
+        Ok((RunDirectory::create(&place, scene, command)?, None))
     }
 }
 
-/// Runs a scene and writes its directory; gives the directory's path.
-pub fn run(scene: &Scene, options: &RunOptions) -> Result<PathBuf, Failure> {
+/// What stands in a directory that is already done.
+pub fn already_done(directory: &RunDirectory) -> Ended {
+    directory.journal.note("already done: nothing to resume");
+    Ended {
+        directory: directory.path().to_owned(),
+        already_done: true,
+        warnings: Vec::new(),
+    }
+}
+
+/// Threads that compute.
+pub fn pool(threads: usize) -> Result<rayon::ThreadPool, Failure> {
+    rayon::ThreadPoolBuilder::new()
+        .num_threads(threads)
+        .build()
+        .map_err(|error| Failure::Run(format!("cannot start {threads} threads: {error}")))
+}
+
+/// Checks all that can be checked of a scene without computing.
+pub fn check(scene: &Scene) -> Result<(), Failure> {
+    match &scene.body {
+        SceneBody::Incline(body) => precheck::incline(scene, body),
+        SceneBody::Bagnold(body) => bagnold::check(scene, body),
+        SceneBody::Impact(body) => impact::check(scene, body),
+    }
+}
+
+/// Runs a scene and writes its directory.
+pub fn run(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> {
     crate::interruption::listen();
+    check(scene)?;
     let threads = options.threads.unwrap_or_else(rayon::current_num_threads);
-    let directory = open_directory(scene, options)?;
-    let summary_of_before = directory.file(run_directory::SUMMARY);
-    if options.resume && report::is_done(&summary_of_before) {
-        directory.journal.note("already done: nothing to resume");
-        return Ok(directory.path().to_owned());
+    let (directory, before) = open_directory(scene, options, "run")?;
+    if before.is_some_and(|s| s.status == Status::Done) {
+        return Ok(already_done(&directory));
     }
     let mut resumed = None;
     let path = directory.file(run_directory::CHECKPOINT);
@@ -135,12 +193,9 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<PathBuf, Failure> {
     if options.resume && path.exists() {
         resumed = Some(checkpoint::read(&path, &scene.name)?);
     }
-    let mut summary = Summary::begun(&scene.name, "run");
-    directory.write_summary(&summary)?;
     directory
         .journal
         .note(&format!("run {} with {threads} threads", scene.name));
-
     let wall_before = resumed.as_ref().map_or(0.0, |c: &Checkpoint| c.wall_s);
     let mut under = Under {
         scene,
@@ -150,32 +205,31 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<PathBuf, Failure> {
         start: Instant::now(),
         wall_before,
         last_checkpoint: Instant::now(),
+        begun: false,
     };
-    let pool = rayon::ThreadPoolBuilder::new()
-        .num_threads(threads)
-        .build()
-        .map_err(|error| Failure::Run(format!("cannot start {threads} threads: {error}")))?;
-    let found = pool.install(|| match &scene.body {
-        SceneBody::Incline(body) => incline::run(body, &mut under),
-        SceneBody::Bagnold(body) => bagnold::run(body, &mut under),
-        SceneBody::Impact(body) => impact::run(body, &mut under),
+    let found = pool(threads).and_then(|pool| {
+        pool.install(|| match &scene.body {
+            SceneBody::Incline(body) => incline::run(body, &mut under),
+            SceneBody::Bagnold(body) => bagnold::run(body, &mut under),
+            SceneBody::Impact(body) => impact::run(body, &mut under),
+        })
     });
+    let (begun, wall_s, going_on) = (under.begun, under.wall_s(), under.resumed.is_some());
     match found.and_then(|findings| finish(scene, &directory, findings)) {
-        Ok(()) => Ok(directory.path().to_owned()),
-        Err(failure @ (Failure::Scene(_) | Failure::Input(_))) => {
+        Ok(()) => Ok(Ended {
+            directory: directory.path().to_owned(),
+            already_done: false,
+            warnings: Vec::new(),
+        }),
+        Err(failure @ (Failure::Scene(_) | Failure::Input(_))) if !begun => {
             directory.abandon();
             Err(failure)
         }
+        // The state to go on from was not touched, and the summary still tells of it.
+        Err(failure) if !begun && going_on => Err(failure),
         Err(failure) => {
-            let interrupted = matches!(failure, Failure::Interrupted { .. });
-            summary.status = if interrupted {
-                Status::Interrupted
-            } else {
-                Status::Failed
-            };
-            summary.remarks.push(failure.to_string());
-            directory.journal.note(&failure.to_string());
-            directory.write_summary(&summary)?;
+            let failure = failure.after_work();
+            directory.mark_ended(&failure, wall_s)?;
             Err(failure)
         }
     }

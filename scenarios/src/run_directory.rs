@@ -2,16 +2,17 @@
 
 use crate::failure::Failure;
 use crate::journal::Journal;
+use crate::report;
 use crate::scene::Scene;
-use crate::summary::Summary;
+use crate::summary::{Status, Summary};
 use crate::table::Table;
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
 
-/// Name of the resolved scene in a run directory; its presence marks the directory as a run.
+/// Name of the resolved scene in a run directory.
 pub const SCENE: &str = "scene.toml";
-/// Name of the summary.
+/// Name of the summary; one of ours marks the directory as a run.
 pub const SUMMARY: &str = "summary.json";
 /// Name of the report.
 pub const REPORT: &str = "report.html";
@@ -23,9 +24,8 @@ pub const CHECKPOINT: &str = "checkpoint.h5";
 pub const LOG: &str = "log.txt";
 
 /// Every file that a run, a campaign or a comparison writes.
-const OWN_FILES: [&str; 19] = [
+const OWN_FILES: [&str; 18] = [
     SCENE,
-    SUMMARY,
     REPORT,
     RESULTS,
     CHECKPOINT,
@@ -49,6 +49,8 @@ const OWN_FILES: [&str; 19] = [
 #[derive(Debug)]
 pub struct RunDirectory {
     path: PathBuf,
+    command: &'static str,
+    scene: String,
     /// The outermost folder that was made for this run, for [`RunDirectory::abandon`].
     made: Option<PathBuf>,
     /// The log.
@@ -66,18 +68,26 @@ pub fn place(out: Option<&Path>, scene: &str) -> PathBuf {
     }
 }
 
-/// Whether a directory was written by this program.
+/// Whether a directory was written by this program: it holds a summary of ours. A `scene.toml`
+/// alone is the user's own input.
 pub fn is_run(path: &Path) -> bool {
-    let text = fs::read_to_string(path.join(SCENE)).unwrap_or_default();
-    text.lines().any(|line| line.starts_with("scene = "))
+    let text = fs::read_to_string(path.join(SUMMARY)).unwrap_or_default();
+    let summary = serde_json::from_str::<serde_json::Value>(&text).unwrap_or_default();
+    summary["format"].is_u64() && summary["command"].is_string() && summary["scene"].is_string()
 }
 
 impl RunDirectory {
-    /// Makes the directory and puts the resolved scene and the log in it.
+    /// Makes the directory and puts summary, resolved scene and log in it.
     ///
-    /// A run of ours that stands there is replaced; any other folder with files in it is refused.
-    pub fn create(path: &Path, scene: &Scene) -> Result<RunDirectory, Failure> {
+    /// A run of ours that stands there is replaced; any other folder with files in it is refused,
+    /// and so is one that holds what the scene was read from.
+    pub fn create(
+        path: &Path,
+        scene: &Scene,
+        command: &'static str,
+    ) -> Result<RunDirectory, Failure> {
         refuse_foreign(path)?;
+        refuse_own_input(path, scene)?;
         let made = outermost_missing(path);
         let unwritable = |error: std::io::Error| {
             if let Some(made) = &made {
@@ -90,28 +100,47 @@ impl RunDirectory {
             ))
         };
         fs::create_dir_all(path).map_err(unwritable)?;
-        if is_run(path) {
+        let replaces = is_run(path);
+        // The summary first: whatever happens from here on, the folder is known as a run.
+        let begun = summary_text(&Summary::begun(&scene.name, command))?;
+        write_in_place(&path.join(SUMMARY), begun.as_bytes()).map_err(unwritable)?;
+        if replaces {
             remove_old_run(path).map_err(unwritable)?;
         }
         write_in_place(&path.join(SCENE), scene.to_toml().as_bytes()).map_err(unwritable)?;
         let journal = Journal::open(&path.join(LOG), false).map_err(unwritable)?;
         Ok(RunDirectory {
             path: path.to_owned(),
+            command,
+            scene: scene.name.clone(),
             made,
             journal,
         })
     }
 
-    /// Opens the directory of a run that is to go on; its scene has to be the same.
-    pub fn reopen(path: &Path, scene: &Scene) -> Result<RunDirectory, Failure> {
+    /// Opens the directory of a run that is to go on; its command and scene have to be the same.
+    /// Also gives the summary that stands there.
+    pub fn reopen(
+        path: &Path,
+        scene: &Scene,
+        command: &'static str,
+    ) -> Result<(RunDirectory, Summary), Failure> {
         let shown = path.display();
+        let summary = report::read_summary(path)
+            .map_err(|error| Failure::Input(format!("--resume: {error}")))?;
+        if summary.command != command {
+            return Err(Failure::Input(format!(
+                "--resume: {shown} was written by `{}`, not by `{command}`; allowed: the directory of an interrupted `{command}`",
+                summary.command
+            )));
+        }
         let text = fs::read_to_string(path.join(SCENE)).map_err(|error| {
             Failure::Input(format!(
                 "--resume: {shown} holds no run to go on with: {SCENE}: {error}; allowed: --out with the directory of an interrupted run"
             ))
         })?;
         let old = Scene::from_text(&text, &path.join(SCENE).display().to_string())?;
-        if old != *scene {
+        if old.resolved != scene.resolved {
             let keys = differing_keys(&old.resolved, &scene.resolved, "");
             return Err(Failure::Input(format!(
                 "--resume: {shown} holds a run of another scene; differing: {}; give the same scene and settings",
@@ -121,12 +150,14 @@ impl RunDirectory {
         let journal = Journal::open(&path.join(LOG), true).map_err(|error| {
             Failure::Input(format!("--out {shown}: cannot write there: {error}"))
         })?;
-        journal.note("resumed");
-        Ok(RunDirectory {
+        let directory = RunDirectory {
             path: path.to_owned(),
+            command,
+            scene: scene.name.clone(),
             made: None,
             journal,
-        })
+        };
+        Ok((directory, summary))
     }
 
     /// Takes back a directory that was made for input that turned out to be bad.
@@ -160,10 +191,33 @@ impl RunDirectory {
 
     /// Writes the summary.
     pub fn write_summary(&self, summary: &Summary) -> Result<(), Failure> {
-        let text = serde_json::to_string_pretty(summary)
-            .map_err(|error| Failure::Run(format!("summary: {error}")))?;
-        self.write(SUMMARY, format!("{text}\n").as_bytes())
+        self.write(SUMMARY, summary_text(summary)?.as_bytes())
     }
+
+    /// Says in the summary that the work is under way.
+    pub fn mark_running(&self) -> Result<(), Failure> {
+        self.write_summary(&Summary::begun(&self.scene, self.command))
+    }
+
+    /// Says in summary and log how the work ended when it did not end well. What it has written
+    /// stays, and so does what it cost so far.
+    pub fn mark_ended(&self, failure: &Failure, wall_s: f64) -> Result<(), Failure> {
+        let mut summary = Summary::begun(&self.scene, self.command);
+        summary.status = match failure {
+            Failure::Interrupted { .. } => Status::Interrupted,
+            _ => Status::Failed,
+        };
+        summary.cost.wall_s = wall_s;
+        summary.remarks.push(failure.to_string());
+        self.journal.note(&failure.to_string());
+        self.write_summary(&summary)
+    }
+}
+
+fn summary_text(summary: &Summary) -> Result<String, Failure> {
+    let text = serde_json::to_string_pretty(summary)
+        .map_err(|error| Failure::Run(format!("summary: {error}")))?;
+    Ok(format!("{text}\n"))
 }
 
 /// Writes under a temporary name in the same folder, flushes and renames.
@@ -196,6 +250,23 @@ fn refuse_foreign(path: &Path) -> Result<(), Failure> {
         return Err(Failure::Input(format!(
             "--out {shown}: is not empty and not a run directory; allowed: a new, an empty or an earlier run's directory"
         )));
+    }
+    Ok(())
+}
+
+/// A run directory is emptied before a new run: what the scene is read from must not be in it.
+fn refuse_own_input(path: &Path, scene: &Scene) -> Result<(), Failure> {
+    let Ok(place) = path.canonicalize() else {
+        return Ok(());
+    };
+    for input in &scene.inputs {
+        if input.canonicalize().is_ok_and(|i| i.starts_with(&place)) {
+            return Err(Failure::Input(format!(
+                "--out {}: holds {}, which this scene is read from and a new run would replace; allowed: another directory, or --resume",
+                path.display(),
+                input.display()
+            )));
+        }
     }
     Ok(())
 }

@@ -77,7 +77,7 @@ impl SceneBody {
 }
 
 /// A checked scene.
-#[derive(Clone, Debug, PartialEq)]
+#[derive(Clone, Debug)]
 pub struct Scene {
     /// The kind, which is also the name of the bundled scene it builds on.
     pub name: String,
@@ -85,6 +85,17 @@ pub struct Scene {
     pub body: SceneBody,
     /// Every key with the value that will be used.
     pub resolved: toml::Table,
+    /// The scene file, or the bundled scene's name, for messages.
+    pub origin: String,
+    /// The files it was read from.
+    pub inputs: Vec<PathBuf>,
+}
+
+/// Scenes are the same if they compute the same, wherever they were read.
+impl PartialEq for Scene {
+    fn eq(&self, other: &Scene) -> bool {
+        self.resolved == other.resolved
+    }
 }
 
 impl Scene {
@@ -107,19 +118,22 @@ impl Scene {
                 )
             }
         };
-        Scene::from_layers(own, &origin, folder.as_deref(), settings)
+        let file = folder.is_some().then(|| PathBuf::from(name_or_path));
+        let mut scene = Scene::from_layers(own, &origin, folder.as_deref(), (settings, "--set"))?;
+        scene.inputs.extend(file);
+        Ok(scene)
     }
 
     /// Reads the resolved scene of a run directory.
     pub fn from_text(text: &str, origin: &str) -> Result<Scene, SceneError> {
-        Scene::from_layers(layers::parse(text, origin)?, origin, None, &[])
+        Scene::from_layers(layers::parse(text, origin)?, origin, None, (&[], "--set"))
     }
 
     fn from_layers(
         mut own: toml::Table,
         origin: &str,
         folder: Option<&Path>,
-        settings: &[String],
+        (settings, option): (&[String], &str),
     ) -> Result<Scene, SceneError> {
         let name = kind_of(&mut own, origin)?;
         let text = bundled(&name).unwrap_or_default();
@@ -140,12 +154,17 @@ impl Scene {
         if let Some(folder) = folder {
             layers::anchor_path(&mut own, &["rheology", "file"], folder);
         }
-        rheology_file::resolve(&mut own)?;
-        let mut set = layers::parse_settings(settings)?;
-        check::check(&set, &schema, "--set")?;
-        layers::check_choices(&set, choices, "--set")?;
-        rheology_file::resolve(&mut set)?;
-        let table = layers::merge(layers::merge(base, own, drops), set, drops);
+        let mut inputs = Vec::new();
+        inputs.extend(rheology_file::resolve(&mut own)?);
+        let mut set = layers::parse_settings(settings, option)?;
+        check::check(&set, &schema, option)?;
+        layers::check_choices(&set, choices, option)?;
+        inputs.extend(rheology_file::resolve(&mut set)?);
+        rheology_file::drop_stale_notes(&mut base, &own);
+        let mut table = layers::merge(base, own, drops);
+        rheology_file::drop_stale_notes(&mut table, &set);
+        let table = layers::merge(table, set, drops);
+        check::check(&table, &schema, origin)?;
         check::require(&table, &schema, origin)?;
 
         let body = body(&name, &table).map_err(|message| SceneError::Unreadable {
@@ -159,14 +178,29 @@ impl Scene {
             name,
             body,
             resolved,
+            origin: origin.to_owned(),
+            inputs,
         };
         scene.check_together(origin)?;
         Ok(scene)
     }
 
-    /// The scene with other settings on top.
-    pub fn with(&self, settings: &[String]) -> Result<Scene, SceneError> {
-        Scene::from_layers(self.resolved.clone(), &self.name, None, settings)
+    /// The scene with other settings on top, which came by the named option.
+    pub fn with(&self, settings: &[String], option: &str) -> Result<Scene, SceneError> {
+        let resolved = self.resolved.clone();
+        let mut scene = Scene::from_layers(resolved, &self.origin, None, (settings, option))?;
+        scene.inputs.extend(self.inputs.iter().cloned());
+        Ok(scene)
+    }
+
+    /// The error that a key of this scene has a value that is not allowed.
+    pub fn out_of_range(&self, key: &str, value: impl ToString, range: &str) -> SceneError {
+        SceneError::OutOfRange {
+            file: self.origin.clone(),
+            key: key.to_owned(),
+            value: value.to_string(),
+            range: range.to_owned(),
+        }
     }
 
     /// The resolved scene as TOML.
@@ -230,6 +264,9 @@ fn plain(error: toml::de::Error) -> String {
     error.message().to_owned()
 }
 
+/// A sphere lighter than this (kg) is a slip of the keyboard, and its mass soon rounds to zero.
+const LEAST_MASS: f64 = 1e-100;
+
 enum Family {
     Incline,
     Bagnold,
@@ -265,6 +302,11 @@ fn body_schema(name: &str) -> Value {
         Family::Impact => schemars::schema_for!(ImpactScene),
     };
     schema.to_value()
+}
+
+/// Checks a table of keys of the continuum scene as a scene file would be.
+pub fn check_continuum_keys(table: &toml::Table, origin: &str) -> Result<(), SceneError> {
+    check::check(table, &body_schema("bagnold"), origin)
 }
 
 /// The JSON Schema of scene files, for editors.

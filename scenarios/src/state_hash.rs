@@ -1,23 +1,23 @@
 //! A short name for the bits of a state.
 
-/// 64-bit FNV-1a over the bits of arrays, in hex.
+use colluvium_dem::StateHash;
+
+/// The hash of the bits of arrays, in hex.
 pub fn of(arrays: &[&[f64]]) -> String {
-    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
+    let mut hash = StateHash::default();
     for value in arrays.iter().flat_map(|a| a.iter()) {
-        for byte in value.to_bits().to_le_bytes() {
-            hash = (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
-        }
+        hash.take(value.to_bits());
     }
-    format!("{hash:016x}")
+    hash.finish()
 }
 
-/// The hash of several hashes.
+/// The hash of several hashes, each in hex as [`of`] gives it.
 pub fn of_hashes<'a>(hashes: impl Iterator<Item = &'a str>) -> String {
-    let mut hash = 0xcbf2_9ce4_8422_2325_u64;
-    for byte in hashes.flat_map(|h| h.bytes()) {
-        hash = (hash ^ u64::from(byte)).wrapping_mul(0x0000_0100_0000_01b3);
+    let mut hash = StateHash::default();
+    for text in hashes {
+        hash.take(u64::from_str_radix(text, 16).unwrap_or_default());
     }
-    format!("{hash:016x}")
+    hash.finish()
 }
 
 #[cfg(test)]
@@ -29,5 +29,8 @@ mod tests {
         assert_ne!(of(&[&[1.0, 0.0]]), of(&[&[1.0, -0.0]]));
         // FNV-1a of the empty string is its offset basis.
         assert_eq!(of(&[]), "cbf29ce484222325");
+        let pair = [of(&[&[1.0]]), of(&[&[2.0]])];
+        let swapped = of_hashes(pair.iter().rev().map(String::as_str));
+        assert_ne!(of_hashes(pair.iter().map(String::as_str)), swapped);
     }
 }

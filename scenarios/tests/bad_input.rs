@@ -51,7 +51,7 @@ const CASES: &[(&[&str], &[&str])] = &[
     ),
     (
         &["run", "incline-moderate", "--set", "scale=0"],
-        &["scale", "0", "[0.4, 50]"],
+        &["scale", "0", "[0.84, 50]"],
     ),
     (
         &["run", "incline-moderate", "--set", "grains.diameter=-0.01"],
@@ -203,6 +203,111 @@ const CASES: &[(&[&str], &[&str])] = &[
     (&["report", "nowhere"], &["nowhere", "summary.json"]),
     (&["scenes", "show", "nothing"], &["nothing", "bagnold"]),
     (&["walk"], &["walk"]),
+    (
+        &["run", "incline-moderate", "--set", "scale=0.5"],
+        &["scale", "0.5", "[0.84, 50]"],
+    ),
+    (
+        &[
+            "calibrate",
+            "incline-moderate",
+            "--set",
+            "calibration.flow_degrees=[0.0]",
+        ],
+        &["calibration.flow_degrees[0]", "0", "(0, 90)"],
+    ),
+    (
+        &[
+            "run",
+            "incline-moderate",
+            "--set",
+            "grains.count=1000000",
+            "--set",
+            "scale=50",
+        ],
+        &["grains.count", "1000000", "at most 8000 at scale 50"],
+    ),
+    (
+        &[
+            "run",
+            "incline-moderate",
+            "--set",
+            "floor.length_diameters=1000",
+            "--set",
+            "floor.width_diameters=1000",
+            "--set",
+            "scale=3",
+        ],
+        &["floor.length_diameters", "1000", "at most 222"],
+    ),
+    (
+        &["run", "incline-moderate", "--set", "grains.diameter=1e-200"],
+        &["grains.diameter", "heavier"],
+    ),
+    (
+        &[
+            "run",
+            "bagnold",
+            "--set",
+            "grid.cells=4096",
+            "--set",
+            "grid.columns=256",
+        ],
+        &["grid.cells", "4096", "200000", "grid.columns"],
+    ),
+    (
+        &["run", "bagnold", "--set", "rheology.valid_i=[0.5, 0.1]"],
+        &["rheology.valid_i", "[0.5, 0.1]", "low < high"],
+    ),
+    (
+        &["run", "bagnold", "--set", "rheology.file=steep.toml"],
+        &["rheology.file", "steep.toml", "rheology.mu_s", "[0, 5]"],
+    ),
+    (
+        &[
+            "run",
+            "two-spheres",
+            "--set",
+            "speed=1e-9",
+            "--set",
+            "gap=1",
+        ],
+        &["two-spheres", "speed", "0.000000001", "1e9 steps"],
+    ),
+    (
+        &["run", "two-spheres", "--set", "duration=1e4"],
+        &["duration", "10000", "1e9 steps"],
+    ),
+    (
+        &["run", "two-spheres", "--set", "radius=1e-200"],
+        &["radius", "heavier"],
+    ),
+    (
+        &[
+            "run",
+            "incline-moderate",
+            "--set",
+            "seed=99999999999999999999",
+        ],
+        &[
+            "seed",
+            "100000000000000000000",
+            "is not allowed",
+            "9007199254740991",
+        ],
+    ),
+    (
+        &["pareto", "bagnold", "--vary", "grid.cells=16,16"],
+        &["--vary", "grid.cells", "16", "same run"],
+    ),
+    (
+        &["pareto", "bagnold", "--vary", "grid.cell=16,32"],
+        &["--vary: unknown key", "grid.cell", "`grid.cells`"],
+    ),
+    (
+        &["run", "mine/scene.toml", "--out", "mine"],
+        &["--out", "mine", "not empty"],
+    ),
 ];
 
 #[test]
@@ -221,6 +326,15 @@ fn bad_input_ends_with_status_2_and_leaves_nothing() {
         "mu_s = 0.4\nmu_2 = 0.1\ni_0 = 0.3\ndiameter = 0.01\nsolid_fraction = 0.5\n",
     )
     .unwrap();
+    fs::write(
+        at("steep.toml"),
+        "mu_s = 7.0\nmu_2 = 8.0\ni_0 = 0.3\ndiameter = 0.01\nsolid_fraction = 0.5\n",
+    )
+    .unwrap();
+    // A folder of the user's own, with a scene file in it.
+    fs::create_dir(at("mine")).unwrap();
+    fs::write(at("mine/scene.toml"), "scene = \"bagnold\"\n").unwrap();
+    fs::write(at("mine/profile.csv"), "mine").unwrap();
     fs::write(at("not.toml"), "{ \"json\": true }").unwrap();
     fs::create_dir(at("others")).unwrap();
     fs::write(at("others/diary.md"), "mine").unwrap();
@@ -246,6 +360,7 @@ fn bad_input_ends_with_status_2_and_leaves_nothing() {
         assert_eq!(listing(), before, "{arguments:?} left something behind");
     }
     assert_eq!(fs::read_dir(at("others")).unwrap().count(), 1);
+    assert_eq!(fs::read_dir(at("mine")).unwrap().count(), 2);
 }
 
 #[test]
@@ -262,4 +377,63 @@ fn a_run_of_ours_may_be_replaced_and_nothing_else() {
     assert!(run("a/b").status.success());
     assert!(folder.path().join("a/b/notes.md").exists());
     assert_eq!(run("a").status.code(), Some(2));
+}
+
+#[test]
+fn a_run_that_the_new_one_reads_from_is_not_replaced() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let small = ["run", "bagnold", "--set", "grid.cells=8", "--out", "a"];
+    assert!(colluvium(folder.path(), &small).status.success());
+    fs::write(
+        at("a/rheology.toml"),
+        "mu_s = 0.4\nmu_2 = 0.8\ni_0 = 0.3\ndiameter = 0.01\nsolid_fraction = 0.5\n",
+    )
+    .unwrap();
+    for arguments in [
+        vec!["run", "a/scene.toml", "--out", "a"],
+        vec![
+            "run",
+            "bagnold",
+            "--set",
+            "rheology.file=a/rheology.toml",
+            "--out",
+            "a",
+        ],
+    ] {
+        let done = colluvium(folder.path(), &arguments);
+        let message = String::from_utf8_lossy(&done.stderr);
+        assert_eq!(done.status.code(), Some(2), "{message}");
+        assert!(message.contains("read from"), "{message}");
+        assert!(at("a/rheology.toml").exists() && at("a/report.html").exists());
+    }
+}
+
+#[test]
+fn bad_input_does_not_cost_an_earlier_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |more: &[&str]| {
+        let mut list = vec!["run", "two-spheres", "--out", "a"];
+        list.extend(more);
+        colluvium(folder.path(), &list)
+    };
+    assert!(run(&[]).status.success());
+    let page = fs::read(folder.path().join("a/report.html")).unwrap();
+    assert_eq!(
+        run(&["--set", "speed=1e-9", "--set", "gap=1"])
+            .status
+            .code(),
+        Some(2)
+    );
+    assert_eq!(fs::read(folder.path().join("a/report.html")).unwrap(), page);
+    // Resuming says that it is done; another command's directory is refused.
+    let again = run(&["--resume"]);
+    assert!(again.status.success());
+    assert!(String::from_utf8_lossy(&again.stdout).contains("already done"));
+    let other = colluvium(
+        folder.path(),
+        &["calibrate", "incline-moderate", "--out", "a", "--resume"],
+    );
+    assert_eq!(other.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&other.stderr).contains("`run`, not by `calibrate`"));
 }

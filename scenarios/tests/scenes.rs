@@ -99,6 +99,89 @@ fn a_rheology_file_is_read_and_its_validity_flagged() {
 }
 
 #[test]
+fn other_numbers_over_a_rheology_file_drop_what_it_says_of_its_own() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(
+        folder.path().join("law.toml"),
+        "mu_s = 0.4\nmu_2 = 0.8\ni_0 = 0.3\ndiameter = 0.01\nsolid_fraction = 0.55\n\
+         valid_i = [0.05, 0.2]\nidentified = false\ngood = false\n",
+    )
+    .unwrap();
+    std::fs::write(
+        folder.path().join("own.toml"),
+        "scene = \"bagnold\"\nslope_degrees = 26.0\nrheology.file = \"law.toml\"\n",
+    )
+    .unwrap();
+    succeed(folder.path(), &["run", "own.toml", "--out", "a"]);
+    let remarks = summary(&folder.path().join("a"))["remarks"].to_string();
+    assert!(remarks.contains("Not identified"), "{remarks}");
+    let set = [
+        "run",
+        "own.toml",
+        "--set",
+        "rheology.mu_s=0.45",
+        "--out",
+        "b",
+    ];
+    succeed(folder.path(), &set);
+    let resolved = std::fs::read_to_string(folder.path().join("b/scene.toml")).unwrap();
+    for key in ["source", "valid_i", "identified", "good"] {
+        assert!(!resolved.contains(key), "{resolved}");
+    }
+}
+
+#[test]
+fn a_fast_rolling_spring_shortens_the_step() {
+    let folder = tempfile::tempdir().unwrap();
+    let plan = succeed(folder.path(), &["plan", "incline-moderate"]);
+    assert!(plan.contains("s: contact: "), "{plan}");
+    let sets = [
+        "contact.rolling.beta=5",
+        "grains.spread=0.5",
+        "timestep.steps_per_contact=10",
+    ];
+    let mut arguments = vec!["plan", "incline-moderate"];
+    for set in sets {
+        arguments.extend(["--set", set]);
+    }
+    let plan = succeed(folder.path(), &arguments);
+    assert!(plan.contains("s: stability: "), "{plan}");
+    assert!(plan.contains("30 % of the stability limit"), "{plan}");
+}
+
+#[test]
+fn under_gravity_no_balance_of_angular_momentum_is_reported() {
+    let folder = tempfile::tempdir().unwrap();
+    for (gravity, reported) in [("0", true), ("9.81", false)] {
+        let set = format!("gravity={gravity}");
+        succeed(
+            folder.path(),
+            &["run", "two-spheres", "--set", &set, "--out", "a"],
+        );
+        let ledger = summary(&folder.path().join("a"))["ledger"].clone();
+        assert_eq!(ledger["angular_momentum_relative"].is_number(), reported);
+    }
+}
+
+#[test]
+fn a_comparison_without_a_value_says_so() {
+    let folder = tempfile::tempdir().unwrap();
+    let vary = "impact_degrees=0,90";
+    let shown = succeed(
+        folder.path(),
+        &["pareto", "two-spheres", "--vary", vary, "--out", "p"],
+    );
+    assert!(shown.contains("none") && !shown.contains("NaN"), "{shown}");
+    let summary = summary(&folder.path().join("p"));
+    assert_eq!(summary["status"], "done");
+    assert!(
+        summary["remarks"]
+            .to_string()
+            .contains("No error at impact_degrees = 90")
+    );
+}
+
+#[test]
 fn impacts_recover_restitution_and_contact_time() {
     let folder = tempfile::tempdir().unwrap();
     for (scene, bodies) in [("two-spheres", 2), ("sphere-on-plane", 1)] {

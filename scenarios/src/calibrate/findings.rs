@@ -14,8 +14,7 @@ use colluvium_coupling::incline::{InclineResult, Outcome, Purpose, Start};
 pub(super) fn summarise(scene: &Scene, record: &Campaign) -> Summary {
     let result = &record.result;
     let mut summary = Summary::begun(&scene.name, "calibrate");
-    let published =
-        published_material(&scene.name).and_then(|m| published_row(m, Estimator::Top, true));
+    let published = published_material(scene).and_then(|m| published_row(m, Estimator::Top, true));
     let source = "thesis Table 2.6, top, with Φ";
     if let Some(fit) = &result.fit {
         let rows = [
@@ -49,7 +48,7 @@ pub(super) fn summarise(scene: &Scene, record: &Campaign) -> Summary {
         );
         summary.put("valid_i_low", Quantity::new(fit.valid_i[0], "1"));
         summary.put("valid_i_high", Quantity::new(fit.valid_i[1], "1"));
-        if let Some(peer) = record.peer(&scene.name) {
+        if let Some(peer) = record.peer(scene) {
             let (mu, error) = fit.band(peer.inertial_number);
             summary.put(
                 "friction_at_peer_i",
@@ -94,6 +93,13 @@ pub(super) fn summarise(scene: &Scene, record: &Campaign) -> Summary {
                 Quantity::new(high, "degree").from("lowest that flows"),
             );
         }
+    }
+    if let Some(fit) = &result.fit {
+        summary.put(
+            "identified",
+            Quantity::new(f64::from(u8::from(fit.identified)), "1")
+                .from("1 = the data determine mu_s, mu_2 and i_0"),
+        );
     }
     let good = f64::from(u8::from(result.verdict.good));
     summary.put(

@@ -6,7 +6,8 @@ mod thesis;
 use super::page::{figure, number, with_error};
 use super::plot::{Band, Mark, Plot};
 use super::{Record, results};
-use crate::calibrate::CAMPAIGN;
+use crate::calibrate::{CAMPAIGN, published_material};
+use crate::scene::Scene;
 use colluvium_coupling::calibration::MuIFit;
 use colluvium_coupling::campaign::CampaignResult;
 use colluvium_coupling::incline::{InclineResult, Outcome, Purpose, Start};
@@ -97,8 +98,8 @@ impl Campaign {
     }
 
     /// The other code's point for a scene.
-    pub fn peer(&self, scene: &str) -> Option<PeerPoint> {
-        (scene == "incline-moderate").then_some(LAMMPS)
+    pub fn peer(&self, scene: &Scene) -> Option<PeerPoint> {
+        (published_material(scene) == Some("moderate")).then_some(LAMMPS)
     }
 
     /// Measured flows with a profile.
@@ -142,7 +143,7 @@ fn sentences(text: &str) -> Vec<String> {
 
 fn law(record: &Record, campaign: &Campaign) -> Markup {
     let result = &campaign.result;
-    let peer = campaign.peer(&record.summary.scene);
+    let peer = record.resolved().and_then(|s| campaign.peer(&s));
     let mut plot = Plot::new("inertial number I", "friction μ = |τ|/p");
     let mut fraction = Plot::new("inertial number I", "solid fraction φ");
     for (colour, run) in campaign.flows().enumerate() {

@@ -5,7 +5,7 @@ use crate::cost::Cost;
 use crate::failure::Failure;
 use crate::interruption;
 use crate::progress::Bar;
-use crate::scene::{BagnoldScene, SolverMethod};
+use crate::scene::{BagnoldScene, Scene, SolverMethod};
 use crate::state_hash;
 use crate::summary::{Model, Quantity, Summary};
 use crate::table::Table;
@@ -83,7 +83,16 @@ pub fn failure(error: colluvium_continuum::Error) -> Failure {
     }
 }
 
+/// Checks the case and the march before anything is written.
+pub(super) fn check(scene: &Scene, body: &BagnoldScene) -> Result<(), Failure> {
+    let named =
+        |error: colluvium_continuum::Error| Failure::Input(format!("{}: {error}", scene.origin));
+    case(body).validate().map_err(named)?;
+    options(body).marching.validate().map_err(named)
+}
+
 pub(super) fn run(scene: &BagnoldScene, under: &mut Under) -> Result<Findings, Failure> {
+    under.begin()?;
     let bar = Bar::new("bagnold");
     let mut farthest = 1.0_f64;
     let solved = solve(scene, &mut |progress: Progress| {
@@ -176,6 +185,7 @@ pub fn describe(
             Some((solution.boundary_shear_stress[0] - weight).abs() / weight);
     }
     summary.state_hash = state_hash::of(&[&solution.u, &solution.p]);
+    summary.remarks.extend(scene.law_remarks());
     let exact = "exact Bagnold profile";
     let rests = case.slope.tan() <= case.rheology.mu_s;
     let error_unit = if rests { "m/s" } else { "1" };
@@ -209,7 +219,7 @@ pub fn describe(
     summary.put(
         "ill_posed_fraction",
         Quantity::new(solution.ill_posed_fraction, "1")
-            .from("volume where C(I) > 0, of the yielded volume"),
+            .from("volume where C(I) > 0, of the total volume"),
     );
     summary.put("steps", Quantity::new(solution.steps as f64, "1"));
     summary.put(
@@ -232,7 +242,7 @@ pub fn describe(
     }
     if solution.ill_posed_fraction > 0.0 {
         summary.remarks.push(format!(
-            "Ill posed: in {:.0} % of the yielded volume μ(I) lies where short waves grow without bound in two or three dimensions (Barker et al. 2015).",
+            "Ill posed: in {:.0} % of the layer's volume μ(I) lies where short waves grow without bound in two or three dimensions (Barker et al. 2015).",
             100.0 * solution.ill_posed_fraction
         ));
     }

@@ -1,10 +1,11 @@
 //! One impact: two spheres, or a sphere on the plane z = 0.
 
+use super::step::{Step, choose};
 use super::{Findings, Under};
 use crate::cost::Cost;
 use crate::failure::Failure;
 use crate::progress::Bar;
-use crate::scene::{ImpactScene, RollingKeys};
+use crate::scene::{ImpactScene, RollingKeys, Scene};
 use crate::summary::{Model, Quantity, Summary};
 use crate::table::Table;
 use colluvium_dem::{
@@ -36,6 +37,51 @@ pub struct Impact {
     pub contact_time: f64,
     /// Duration (s).
     pub duration: f64,
+    /// Time step.
+    pub step: Step,
+}
+
+impl Impact {
+    /// Steps of the whole run; not a whole number beyond 2^53.
+    pub fn steps(&self) -> f64 {
+        (self.duration / self.step.seconds).ceil()
+    }
+}
+
+/// Most steps of an impact: about an hour.
+const MOST_STEPS: f64 = 1e9;
+
+/// Checks an impact before anything is written.
+pub(super) fn check(scene: &Scene, body: &ImpactScene) -> Result<(), Failure> {
+    let impact = prepare(body, scene.name == "two-spheres");
+    if !impact.step.seconds.is_normal() || !impact.contact_time.is_finite() {
+        let range = format!(
+            "such that the time step, here {:e} s, is a number a computer can hold",
+            impact.step.seconds
+        );
+        return Err(scene
+            .out_of_range("stiffness", body.stiffness, &range)
+            .into());
+    }
+    let steps = impact.steps();
+    if steps > MOST_STEPS {
+        // The key that makes it long: the duration as given, or the flight up to the contact.
+        let (key, value) = if body.duration > 0.0 {
+            ("duration", body.duration)
+        } else if impact.duration > 4.0 * impact.contact_time {
+            ("speed", body.speed)
+        } else {
+            ("steps_per_contact", body.steps_per_contact)
+        };
+        let range = format!(
+            "such that the run takes at most {MOST_STEPS:e} steps; it would take {steps:.3e}, over {:e} s with a gap of {} m",
+            impact.duration, body.gap
+        );
+        return Err(scene.out_of_range(key, value, &range).into());
+    }
+    Simulation::new(impact.setup)
+        .map(drop)
+        .map_err(|error| Failure::Input(format!("{}: {error}", scene.origin)))
 }
 
 /// Rolling and twisting springs of a scene.
@@ -97,6 +143,7 @@ pub fn prepare(scene: &ImpactScene, pair: bool) -> Impact {
         approach + 2.0 * contact_time
     };
     let reach = 20.0 * radius + scene.gap;
+    let step = choose(undamped, scene.steps_per_contact, &law, mass);
     Impact {
         setup: Setup {
             domain: Domain {
@@ -108,12 +155,13 @@ pub fn prepare(scene: &ImpactScene, pair: bool) -> Impact {
             law,
             grains,
             planes,
-            timestep: undamped / scene.steps_per_contact,
+            timestep: step.seconds,
             threads: Threads::Serial,
         },
         reduced_mass,
         contact_time,
         duration,
+        step,
     }
 }
 
@@ -188,7 +236,7 @@ pub(super) fn run(scene: &ImpactScene, under: &mut Under) -> Result<Findings, Fa
     let pair = under.scene.name == "two-spheres";
     let impact = prepare(scene, pair);
     let timestep = impact.setup.timestep;
-    let steps = (impact.duration / timestep).ceil() as u64;
+    let steps = impact.steps() as u64;
     let stride = (steps / scene.rows.max(1)).max(1);
     let bodies = if pair { 2 } else { 1 };
     let width = 1 + 9 * bodies;
@@ -204,6 +252,7 @@ pub(super) fn run(scene: &ImpactScene, under: &mut Under) -> Result<Findings, Fa
             Watch::default(),
         ),
     };
+    under.begin()?;
     let bar = Bar::new(&under.scene.name);
     let mut snapshot = Snapshot::default();
     if simulation.steps_done() == 0 {
@@ -231,10 +280,7 @@ pub(super) fn run(scene: &ImpactScene, under: &mut Under) -> Result<Findings, Fa
         grains: bodies as u64,
         cells: 0,
         dt_s: timestep,
-        dt_limit: format!(
-            "contact time over steps_per_contact = {}",
-            scene.steps_per_contact
-        ),
+        dt_limit: impact.step.limit.clone(),
         left_out: left_out(scene),
     };
     summary.cost = Cost::measured(under.wall_s(), 1, steps * bodies as u64, 0);
@@ -392,7 +438,8 @@ fn describe(
         let drift = simulation.leapfrog_momentum() + simulation.wall_impulse() - initial;
         summary.ledger.momentum_relative = Some(drift.norm() / initial.norm());
     }
-    if impact.setup.planes.is_empty() {
+    // Gravity has a moment about the origin: its angular momentum is not kept.
+    if scene.gravity == 0.0 && impact.setup.planes.is_empty() {
         summary.ledger.angular_momentum_relative = angular_momentum_error(impact, watch);
     }
 }

@@ -1,6 +1,7 @@
 //! Grains on an inclined plane: from the scene to profiles.
 
 use super::impact::shape;
+use super::step::{Step, choose};
 use super::{Findings, Under};
 use crate::cost::Cost;
 use crate::failure::Failure;
@@ -60,20 +61,15 @@ pub fn law(scene: &InclineScene) -> ContactLaw {
     }
 }
 
-/// The time step of a scene (s).
-pub fn step(scene: &InclineScene) -> f64 {
-    timestep::step(
-        scene.mean_mass(),
-        scene.stiffness(),
+/// The time step of a scene: that of two mean grains (Eq. 2.7) unless the smallest needs a finer one.
+pub fn step(scene: &InclineScene) -> Step {
+    let contact_time = timestep::step(scene.mean_mass(), scene.stiffness(), 1.0);
+    let smallest = 2.0 * scene.smallest_radius() / scene.grains.diameter;
+    choose(
+        contact_time,
         scene.timestep.steps_per_contact,
-    )
-}
-
-/// What limits that step.
-pub fn step_limit(scene: &InclineScene) -> String {
-    format!(
-        "contact time of two mean grains over {}",
-        scene.timestep.steps_per_contact
+        &law(scene),
+        scene.mean_mass() * smallest.powi(3),
     )
 }
 
@@ -100,7 +96,7 @@ pub fn bed(scene: &InclineScene) -> InclineBed {
         width,
         law: law(scene),
         gravity: scene.gravity,
-        timestep: step(scene),
+        timestep: step(scene).seconds,
         seed: scene.seed,
     }
 }
@@ -117,7 +113,7 @@ pub fn start(scene: &InclineScene) -> Start {
 
 /// The run that a scene asks for, on a settled bed.
 pub fn spec(scene: &InclineScene, bed: &Bed, threads: Threads) -> InclineSpec {
-    let timestep = step(scene);
+    let timestep = step(scene).seconds;
     InclineSpec {
         slope: scene.slope_degrees.to_radians(),
         gravity: scene.gravity,
@@ -173,6 +169,9 @@ pub(super) fn run(scene: &InclineScene, under: &mut Under) -> Result<Findings, F
     } else {
         Threads::Serial
     };
+    if under.resumed.is_none() {
+        under.begin()?;
+    }
     let bar = Bar::new("settling the bed");
     // The bed is not kept: the same seed gives the same bits again.
     let Some(bed) = settle(scene, threads, &bar)? else {
@@ -193,6 +192,9 @@ pub(super) fn run(scene: &InclineScene, under: &mut Under) -> Result<Findings, F
         None => InclineRun::new(spec.clone()),
     }
     .map_err(failure)?;
+    if under.resumed.is_some() {
+        under.begin()?;
+    }
     let bar = Bar::new(&format!(
         "{} at {} degrees",
         under.scene.name, scene.slope_degrees
@@ -239,11 +241,12 @@ pub(super) fn run(scene: &InclineScene, under: &mut Under) -> Result<Findings, F
 
 /// What was modelled.
 pub fn model(scene: &InclineScene, bed: &Bed) -> Model {
+    let step = step(scene);
     Model {
         grains: bed.grains.len() as u64,
         cells: 0,
-        dt_s: step(scene),
-        dt_limit: step_limit(scene),
+        dt_s: step.seconds,
+        dt_limit: step.limit,
         left_out: left_out(scene),
     }
 }

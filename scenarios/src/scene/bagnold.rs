@@ -39,10 +39,10 @@ pub struct RheologyKeys {
     #[schemars(extend("minimum" = 0.0, "maximum" = 5.0))]
     pub mu_s: f64,
     /// Friction μ_2 at I → ∞.
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 20.0))]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
     pub mu_2: f64,
     /// Inertial number I_0 half way between.
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
     pub i_0: f64,
     /// Grain diameter d (m).
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0))]
@@ -61,6 +61,12 @@ pub struct RheologyKeys {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minItems" = 2, "maxItems" = 2, "items" = {"type": "number", "minimum": 0.0, "maximum": 1.0e4}))]
     pub valid_i: Option<Vec<f64>>,
+    /// Whether the data determine all three of mu_s, mu_2 and i_0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub identified: Option<bool>,
+    /// Whether the calibration was judged fit to feed a continuum.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub good: Option<bool>,
     /// Where the numbers come from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<String>,
@@ -108,10 +114,31 @@ pub enum SolverMethod {
     Regularised,
 }
 
+/// Most cells of a grid: their matrix has to fit into the memory of one machine.
+const LARGEST_GRID: u64 = 200_000;
+
 impl BagnoldScene {
     /// Cells across the depth at this scale.
     pub fn cells(&self) -> usize {
         (self.grid.cells as f64 * self.scale).round().max(4.0) as usize
+    }
+
+    /// What has to be known of the law beyond its numbers, in words.
+    pub fn law_remarks(&self) -> Vec<String> {
+        let r = &self.rheology;
+        let source = r.source.as_deref().unwrap_or("the scene");
+        let mut remarks = Vec::new();
+        if r.identified == Some(false) {
+            remarks.push(format!(
+                "Not identified: the data of the law from {source} do not determine μ_s, μ_2 and I_0 apart; outside the measured range it says nothing."
+            ));
+        }
+        if r.good == Some(false) {
+            remarks.push(format!(
+                "The calibration of the law from {source} was judged not good enough to feed a continuum."
+            ));
+        }
+        remarks
     }
 
     pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {
@@ -123,7 +150,34 @@ impl BagnoldScene {
                 range: "1, or 3 to 256".into(),
             });
         }
+        let cells = self.cells() as u64 * self.grid.columns;
+        if cells > LARGEST_GRID {
+            let (key, value) = if self.grid.columns > self.cells() as u64 {
+                ("grid.columns", self.grid.columns)
+            } else {
+                ("grid.cells", self.grid.cells)
+            };
+            return Err(SceneError::OutOfRange {
+                file: origin.to_owned(),
+                key: key.into(),
+                value: value.to_string(),
+                range: format!(
+                    "at most {LARGEST_GRID} for grid.cells x grid.columns x scale, here {} x {} x {}",
+                    self.grid.cells, self.grid.columns, self.scale
+                ),
+            });
+        }
         let r = &self.rheology;
+        if let Some([low, high]) = r.valid_i.as_deref()
+            && low >= high
+        {
+            return Err(SceneError::OutOfRange {
+                file: origin.to_owned(),
+                key: "rheology.valid_i".into(),
+                value: format!("[{low}, {high}]"),
+                range: "[low, high] with low < high".into(),
+            });
+        }
         if r.mu_2 < r.mu_s {
             return Err(SceneError::OutOfRange {
                 file: origin.to_owned(),

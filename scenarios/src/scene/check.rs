@@ -113,6 +113,8 @@ impl Checker<'_> {
         let number = match (kind(schema), value) {
             ("number", toml::Value::Float(x)) => *x,
             ("number" | "integer", toml::Value::Integer(n)) => *n as f64,
+            // An integer that was too large to be read as one.
+            ("integer", toml::Value::Float(x)) if x.abs() >= 9.2e18 && x.fract() == 0.0 => *x,
             ("string", toml::Value::String(text)) => {
                 return if words(schema).is_empty() || words(schema).contains(&text.as_str()) {
                     Ok(())
@@ -123,7 +125,8 @@ impl Checker<'_> {
             ("boolean", toml::Value::Boolean(_)) => return Ok(()),
             _ => return Err(wrong_type()),
         };
-        if inside(number, schema) {
+        let readable = kind(schema) == "number" || value.is_integer();
+        if readable && inside(number, schema) {
             Ok(())
         } else {
             Err(self.out_of_range(value, schema, key))

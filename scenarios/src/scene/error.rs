@@ -87,8 +87,10 @@ pub enum SceneError {
         second: String,
     },
     /// A setting that is not of the form `KEY=VALUE`.
-    #[error("--set {text}: wanted KEY=VALUE, as in `--set slope_degrees=25`")]
+    #[error("{option} {text}: wanted KEY=VALUE, as in `{option} slope_degrees=25`")]
     Setting {
+        /// The option it came by.
+        option: String,
         /// The setting as written.
         text: String,
     },

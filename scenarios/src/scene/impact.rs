@@ -1,6 +1,6 @@
 //! Keys of one impact: two spheres, or a sphere on a plane.
 
-use super::SceneError;
+use super::{LEAST_MASS, SceneError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -80,6 +80,20 @@ impl ImpactScene {
     }
 
     pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {
+        if self.mass() <= LEAST_MASS {
+            // Whichever of the two is the slip.
+            let (key, value) = if self.radius < 1e-20 {
+                ("radius", self.radius)
+            } else {
+                ("density", self.density)
+            };
+            return Err(SceneError::OutOfRange {
+                file: origin.to_owned(),
+                key: key.into(),
+                value: value.to_string(),
+                range: format!("such that the sphere is heavier than {LEAST_MASS:e} kg"),
+            });
+        }
         if self.gap < -0.5 * self.radius {
             return Err(SceneError::OutOfRange {
                 file: origin.to_owned(),

@@ -1,6 +1,6 @@
 //! Keys of the inclined-plane scenes.
 
-use super::SceneError;
+use super::{LEAST_MASS, SceneError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -12,7 +12,7 @@ pub struct InclineScene {
     #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 90.0))]
     pub slope_degrees: f64,
     /// Size of the run: both edges of the floor grow with it, grains with its square; depth stays.
-    #[schemars(extend("minimum" = 0.4, "maximum" = 50.0))]
+    #[schemars(extend("minimum" = 0.84, "maximum" = 50.0))]
     pub scale: f64,
     /// Whether the bed starts at rest or already flowing.
     pub start: InclineStart,
@@ -166,7 +166,7 @@ pub struct TimeKeys {
 #[serde(deny_unknown_fields)]
 pub struct CalibrationKeys {
     /// Angles run from flow to measure μ(I) (degrees).
-    #[schemars(extend("minItems" = 1, "maxItems" = 60, "items" = {"type": "number", "minimum": 0.0, "exclusiveMaximum": 90.0}))]
+    #[schemars(extend("minItems" = 1, "maxItems" = 60, "items" = {"type": "number", "exclusiveMinimum": 0.0, "exclusiveMaximum": 90.0}))]
     pub flow_degrees: Vec<f64>,
     /// Where a flowing bed stops, bracketed from flow.
     pub stop: Bracket,
@@ -212,15 +212,20 @@ pub struct GuessKeys {
 #[serde(deny_unknown_fields)]
 pub struct Bracket {
     /// An angle at which it rests (degrees).
-    #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 90.0))]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 90.0))]
     pub low: f64,
     /// An angle at which it flows (degrees).
-    #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 90.0))]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 90.0))]
     pub high: f64,
     /// Width at which halving ends (degrees).
     #[schemars(extend("minimum" = 0.05, "maximum" = 90.0))]
     pub resolution: f64,
 }
+
+/// Most free grains: about 20 GB of memory.
+const MOST_GRAINS: usize = 20_000_000;
+/// Largest floor, in squares of the diameter: its base has about as many grains.
+const LARGEST_FLOOR: f64 = 2.0e6;
 
 impl InclineScene {
     /// Normal stiffness k_n (N/m), from whichever of the three keys is given.
@@ -285,6 +290,34 @@ impl InclineScene {
                 key: "contact.stiffness_scaled".into(),
                 wanted: "one of contact.stiffness_scaled, contact.stiffness, contact.stiffness_from_speed".into(),
             });
+        }
+        if self.mean_mass() <= LEAST_MASS {
+            return out_of_range(
+                "grains.diameter",
+                self.grains.diameter,
+                format!("such that a grain is heavier than {LEAST_MASS:e} kg"),
+            );
+        }
+        if self.free_grains() > MOST_GRAINS {
+            let most = MOST_GRAINS as f64 / (self.scale * self.scale);
+            return out_of_range(
+                "grains.count",
+                self.grains.count as f64,
+                format!("at most {most:.0} at scale {}", self.scale),
+            );
+        }
+        let area =
+            self.floor.length_diameters * self.floor.width_diameters * self.scale * self.scale;
+        if area > LARGEST_FLOOR {
+            let most = LARGEST_FLOOR / (self.floor.width_diameters * self.scale * self.scale);
+            return out_of_range(
+                "floor.length_diameters",
+                self.floor.length_diameters,
+                format!(
+                    "at most {most} at floor.width_diameters {} and scale {}",
+                    self.floor.width_diameters, self.scale
+                ),
+            );
         }
         // Two largest diameters and the search list's skin have to fit twice into a periodic axis.
         let least = 5.0;

@@ -20,10 +20,13 @@ pub fn parse(text: &str, origin: &str) -> Result<Table, SceneError> {
 }
 
 /// `KEY=VALUE` settings as one table. VALUE is TOML; what is not TOML is taken as a bare string.
-pub fn parse_settings(settings: &[String]) -> Result<Table, SceneError> {
+pub fn parse_settings(settings: &[String], option: &str) -> Result<Table, SceneError> {
     let mut table = Table::new();
     for text in settings {
-        let malformed = || SceneError::Setting { text: text.clone() };
+        let malformed = || SceneError::Setting {
+            option: option.to_owned(),
+            text: text.clone(),
+        };
         let (key, value) = text.split_once('=').ok_or_else(malformed)?;
         let (key, value) = (key.trim(), value.trim());
         if key.is_empty() || value.is_empty() || key.split('.').any(|part| part.is_empty()) {
@@ -31,14 +34,14 @@ pub fn parse_settings(settings: &[String]) -> Result<Table, SceneError> {
         }
         if key == "scene" {
             return Err(SceneError::OutOfRange {
-                file: "--set".into(),
+                file: option.to_owned(),
                 key: "scene".into(),
                 value: value.into(),
                 range: "not to be set: give the other scene's name instead".into(),
             });
         }
         insert(&mut table, key, setting_value(value)).map_err(|at| SceneError::WrongType {
-            file: "--set".into(),
+            file: option.to_owned(),
             key: at,
             value: text.clone(),
             found: "value".into(),
@@ -55,8 +58,18 @@ fn setting_value(text: &str) -> Value {
         Ok(mut table) if table.len() == 1 => table
             .remove("value")
             .unwrap_or_else(|| Value::String(text.to_owned())),
-        _ => Value::String(text.to_owned()),
+        // TOML has no integers of more than 64 bits: the range check should see a number.
+        _ => match text.replace('_', "").parse::<f64>() {
+            Ok(number) if text.trim_start_matches(['+', '-']).bytes().all(is_digit) => {
+                Value::Float(number)
+            }
+            _ => Value::String(text.to_owned()),
+        },
     }
+}
+
+fn is_digit(byte: u8) -> bool {
+    byte.is_ascii_digit() || byte == b'_'
 }
 
 /// Inserts at a dotted path; the error is the path of something that is in the way.

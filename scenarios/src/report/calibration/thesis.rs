@@ -9,7 +9,7 @@ use maud::{Markup, html};
 
 /// Published rows, ours, and the difference in joint standard errors.
 pub(super) fn thesis(record: &Record, campaign: &Campaign) -> Markup {
-    let Some(material) = published_material(&record.summary.scene) else {
+    let Some(material) = record.resolved().and_then(|s| published_material(&s)) else {
         return html! {};
     };
     let name = |e: Estimator| match e {
