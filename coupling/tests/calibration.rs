@@ -162,6 +162,53 @@ fn a_narrow_range_is_flagged_in_words() {
 }
 
 #[test]
+fn the_height_of_the_law_is_judged_with_the_covariance() {
+    let mut rng = ChaCha8Rng::seed_from_u64(5);
+    let slow: Vec<(f64, f64)> = (0..6)
+        .map(|k| 0.1 + 0.1 * f64::from(k))
+        .map(|i| (i, i + 0.1))
+        .collect();
+    let mut differ = 0;
+    for draw_number in 0..200 {
+        // From well known to hardly known, so that some come near the limit of 50 %.
+        let own = 0.0005 * f64::from(draw_number % 50 + 1);
+        let points = draw(&mut rng, &slow, 10, own, 0.5 * own);
+        let Ok(fit) = fit_mu_i(&points, Stress::MeanPressure) else {
+            continue;
+        };
+        let c = &fit.covariance;
+        let height = fit.mu_2 - fit.mu_s;
+        let error = (c[0][0] + c[1][1] - 2.0 * c[0][1]).sqrt();
+        let flagged = fit.identifiability.contains("mu_2 - mu_s");
+        assert_eq!(flagged, error >= 0.5 * height, "{}", fit.identifiability);
+        differ += u32::from(flagged != (fit.mu_s_error.hypot(fit.mu_2_error) >= 0.5 * height));
+    }
+    println!("as if uncorrelated, {differ} of 200 draws would be judged otherwise");
+    assert!(differ > 0);
+}
+
+#[test]
+fn a_law_that_no_material_has_is_called_so() {
+    let mut rng = ChaCha8Rng::seed_from_u64(6);
+    let points = draw(&mut rng, &WIDE, 12, 0.004, 0.002);
+    let law = |mu_s: f64, mu_2: f64| {
+        let moved: Vec<_> = points
+            .iter()
+            .map(|p| LocalPoint {
+                friction: mu_of_i(mu_s, mu_2, 0.3, p.inertial_number),
+                ..*p
+            })
+            .collect();
+        fit_mu_i(&moved, Stress::MeanPressure).unwrap()
+    };
+    assert!(law(0.45, 0.8).physical && law(0.0001, 0.8).physical);
+    let negative = law(-0.1, 0.8);
+    assert!(!negative.physical && negative.mu_s < 0.0);
+    let falling = law(0.8, 0.45);
+    assert!(!falling.physical && falling.mu_2 < falling.mu_s);
+}
+
+#[test]
 fn bad_points_are_named() {
     let mut rng = ChaCha8Rng::seed_from_u64(3);
     let mut points = draw(&mut rng, &WIDE, 4, 0.004, 0.0);

@@ -1,7 +1,7 @@
 //! Runs of real grains down a slope.
 
 use colluvium_coupling::campaign::{
-    Bracket, CampaignError, CampaignEvent, CampaignSpec, GuessedLaw, run_campaign,
+    Bracket, CampaignError, CampaignEvent, CampaignSpec, GuessedLaw, evaluate, run_campaign,
 };
 use colluvium_coupling::incline::{
     InclineError, InclineResult, InclineRun, InclineSpec, Outcome, Purpose, Start,
@@ -261,6 +261,11 @@ fn bad_numbers_are_named() {
     assert!(message(&|s| s.slope = 2.0).contains("slope_degrees = 114.59"));
     assert!(message(&|s| s.layer = -1.0).contains("layer = -1"));
     assert!(message(&|s| s.layer = 1e-9).contains("layer"));
+    // 0.6 s are 40 samples; a search takes no averages.
+    assert!(message(&|s| s.average_time = 0.59).contains("average_time = 0.59"));
+    let mut search = good.clone();
+    (search.purpose, search.average_time) = (Purpose::StopSearch, 0.0);
+    assert_eq!(search.validate(), Ok(()));
     assert!(message(&|s| s.max_time = 1.5).contains("max_time = 1.5"));
     assert!(message(&|s| s.bed.retain(|g| g.fixed)).contains("free grain"));
     assert!(
@@ -361,10 +366,55 @@ fn a_campaign_does_not_depend_on_threads_and_goes_on_where_it_stopped() {
     }
     assert_eq!(one, two);
 
+    the_rule_of_drifts_decides(&campaign, &one.runs);
+
     let mut bad = tiny_campaign();
     bad.stop.low = 40.0;
     let message = run_campaign(&bad, &[], &count, &never)
         .unwrap_err()
         .to_string();
     assert!(message.contains("stop.high - stop.low"), "{message}");
+}
+
+/// Which flows enter the fit, by the drift of finished runs and of the same runs with other drifts.
+fn the_rule_of_drifts_decides(campaign: &CampaignSpec, runs: &[InclineResult]) {
+    let flows: Vec<InclineResult> = runs[..4].to_vec();
+    let strict = |limit: f64| CampaignSpec {
+        usable_drift: limit,
+        ..campaign.clone()
+    };
+    let reach = |r: &InclineResult| r.steady.drift.abs() + r.steady.drift_error;
+    for flow in &flows {
+        assert!(flow.steady.drift_known && flow.profile.is_some());
+        assert!(strict(1.001 * reach(flow)).is_usable(flow));
+        // The drift alone would pass.
+        assert!(flow.steady.drift.abs() < 0.999 * reach(flow));
+        assert!(!strict(0.999 * reach(flow)).is_usable(flow));
+        let mut unknown = flow.clone();
+        unknown.steady.drift_known = false;
+        (unknown.steady.drift, unknown.steady.drift_error) = (0.0, 0.0);
+        assert!(!strict(0.25).is_usable(&unknown));
+    }
+    // With a limit between the second and the third, two flows are left out of points, fit and estimators.
+    let mut reaches: Vec<f64> = flows.iter().map(reach).collect();
+    println!("drift and its error: {reaches:.3?}");
+    reaches.sort_by(f64::total_cmp);
+    let half = strict(0.5 * (reaches[1] + reaches[2]));
+    let result = evaluate(&half, flows, Vec::new(), Vec::new());
+    let text = &result.verdict.text;
+    assert!(text.contains("2 of 4 flows left out"), "{text}");
+    let used = result.runs.iter().filter(|r| half.is_usable(r));
+    assert_eq!(
+        result.points.len(),
+        used.map(|r| r.points.len()).sum::<usize>()
+    );
+    // Flows alone, none of which stopped.
+    assert!(result.stop_bracket_degrees.is_none());
+    for why in [
+        "no bracket, because every bed flows, down to the lowest slope of 31.00°",
+        "no bracket, because no slope was tried",
+    ] {
+        assert!(text.contains(why), "{text}");
+    }
+    assert!(!text.contains("overlap") || text.contains("at any step since the start"));
 }

@@ -42,40 +42,7 @@ pub(super) fn judge(e: &Evidence) -> Verdict {
             good = false;
             text.push(format!("No rheology: {error}."));
         }
-        Ok(fit) => {
-            text.push(format!(
-                "mu_s = {:.3} ± {:.3}, mu_2 = {:.3} ± {:.3}, I_0 = {:.3} ± {:.3} for mu = |tau|/p with \
-                 p = trace/3, from {} points of {} flows, valid for I = {:.3} to {:.3}.",
-                fit.mu_s, fit.mu_s_error, fit.mu_2, fit.mu_2_error, fit.i_0, fit.i_0_error,
-                fit.degrees_of_freedom + 3, fit.runs, fit.valid_i[0], fit.valid_i[1],
-            ));
-            let (middle, error) = fit.band((fit.valid_i[0] * fit.valid_i[1]).sqrt());
-            let misfit = fit.rms_residual / middle;
-            if misfit > LARGEST_MISFIT {
-                good = false;
-                text.push(format!(
-                    "Points scatter by {:.1} % of mu about the curve (more than {:.0} %): one mu(I) does not \
-                     describe this material.",
-                    100.0 * misfit, 100.0 * LARGEST_MISFIT
-                ));
-            } else {
-                text.push(format!(
-                    "mu(I) describes the points to {:.1} % of mu; in the middle of the range mu is known to \
-                     {:.1} %.",
-                    100.0 * misfit, 100.0 * error / middle
-                ));
-            }
-            text.push(fit.identifiability.clone());
-            good &= fit.identified;
-            if !fit.physical {
-                good = false;
-                text.push(unphysical(fit));
-            }
-            text.push(format!(
-                "Errors are {:.1} times those of counting, because layers of one run are not independent.",
-                fit.error_scale
-            ));
-        }
+        Ok(fit) => judge_fit(fit, &mut good, &mut text),
     }
     if let Ok(fit) = e.fit_zz {
         text.push(format!(
@@ -109,6 +76,49 @@ pub(super) fn judge(e: &Evidence) -> Verdict {
         good,
         text: text.join(" "),
     }
+}
+
+fn judge_fit(fit: &MuIFit, good: &mut bool, text: &mut Vec<String>) {
+    text.push(format!(
+        "mu_s = {:.3} ± {:.3}, mu_2 = {:.3} ± {:.3}, I_0 = {:.3} ± {:.3} for mu = |tau|/p with \
+                 p = trace/3, from {} points of {} flows, valid for I = {:.3} to {:.3}.",
+        fit.mu_s,
+        fit.mu_s_error,
+        fit.mu_2,
+        fit.mu_2_error,
+        fit.i_0,
+        fit.i_0_error,
+        fit.degrees_of_freedom + 3,
+        fit.runs,
+        fit.valid_i[0],
+        fit.valid_i[1],
+    ));
+    let (middle, error) = fit.band((fit.valid_i[0] * fit.valid_i[1]).sqrt());
+    let misfit = fit.rms_residual / middle;
+    if misfit > LARGEST_MISFIT {
+        *good = false;
+        text.push(format!(
+                    "Points scatter by {:.1} % of mu about the curve (more than {:.0} %): one mu(I) does not \
+                     describe this material.",
+                    100.0 * misfit, 100.0 * LARGEST_MISFIT
+                ));
+    } else {
+        text.push(format!(
+                    "mu(I) describes the points to {:.1} % of mu; in the middle of the range mu is known to \
+                     {:.1} %.",
+                    100.0 * misfit, 100.0 * error / middle
+                ));
+    }
+    text.push(fit.identifiability.clone());
+    *good &= fit.identified;
+    if !fit.physical {
+        *good = false;
+        text.push(unphysical(fit));
+    }
+    text.push(format!(
+        "Errors are {:.1} times those of counting, because layers of one run are not independent.",
+        fit.error_scale
+    ));
 }
 
 /// Why no material has this law.
@@ -228,5 +238,47 @@ fn compare(e: &Evidence, material: &str, text: &mut Vec<String>) {
              and the base 3 d; our flows are a few hundred diameters of shear long and may still drift."
                 .into(),
         );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::calibration::{LocalPoint, Stress, fit_mu_i, mu_of_i};
+
+    #[test]
+    fn an_unphysical_law_is_refused_in_words() {
+        let fit = |mu_s: f64, mu_2: f64| {
+            let points: Vec<LocalPoint> = (1..30)
+                .map(|k| {
+                    let i = 0.05 * f64::from(k);
+                    let friction = mu_of_i(mu_s, mu_2, 0.3, i);
+                    LocalPoint {
+                        slope_degrees: f64::from(k / 5),
+                        z: 0.0,
+                        inertial_number: i,
+                        inertial_number_error: 0.0,
+                        friction,
+                        friction_error: 1e-3,
+                        friction_zz: friction,
+                        friction_zz_error: 1e-3,
+                        solid_fraction: 0.58 - 0.1 * i,
+                        solid_fraction_error: 1e-3,
+                    }
+                })
+                .collect();
+            fit_mu_i(&points, Stress::MeanPressure).unwrap()
+        };
+        let judged = |fit: &MuIFit| {
+            let (mut good, mut text) = (true, Vec::new());
+            judge_fit(fit, &mut good, &mut text);
+            (good, text.join(" "))
+        };
+        let (good, text) = judged(&fit(0.45, 0.8));
+        assert!(good && !text.contains("No material"), "{text}");
+        let (good, text) = judged(&fit(-0.3, 0.8));
+        assert!(!good && text.contains("negative at slow shear"), "{text}");
+        let (good, text) = judged(&fit(0.8, 0.45));
+        assert!(!good && text.contains("would not rise"), "{text}");
     }
 }

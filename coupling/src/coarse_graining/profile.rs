@@ -349,3 +349,30 @@ impl BalanceCheck {
         check
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::jackknife_error;
+
+    /// Estimates without one block each, of a mean over blocks.
+    fn without(blocks: &[f64]) -> Vec<f64> {
+        let (n, sum) = (blocks.len() as f64, blocks.iter().sum::<f64>());
+        blocks.iter().map(|x| (sum - x) / (n - 1.0)).collect()
+    }
+
+    #[test]
+    fn swinging_blocks_do_not_narrow_the_error_and_slow_ones_widen_it() {
+        let n = 40;
+        let plain = |blocks: &[f64]| {
+            let mean = blocks.iter().sum::<f64>() / n as f64;
+            let squares: f64 = blocks.iter().map(|x| (x - mean).powi(2)).sum();
+            (squares / (n * (n - 1)) as f64).sqrt()
+        };
+        let swing: Vec<f64> = (0..n).map(|k| [1.0, -1.0][k % 2]).collect();
+        let error = jackknife_error(&without(&swing));
+        assert!((error / plain(&swing) - 1.0).abs() < 1e-9, "{error}");
+        let slow: Vec<f64> = (0..n).map(|k| (0.2 * k as f64).sin()).collect();
+        assert!(jackknife_error(&without(&slow)) > 2.0 * plain(&slow));
+        assert_eq!(jackknife_error(&without(&[3.0; 40])), 0.0);
+    }
+}
