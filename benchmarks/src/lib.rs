@@ -2,13 +2,9 @@
 
 use colluvium_continuum::bagnold::BagnoldCase;
 use colluvium_continuum::rheology::MuI;
-use colluvium_dem::preparation::{InclineBed, RadiusLaw, settle_incline_bed};
-use colluvium_dem::{
-    ContactLaw, Hooke, Lever, Setup, SetupError, ShapeParameter, Simulation, TangentialSpring,
-    Threads, timestep,
-};
+use colluvium_dem::{Setup, SetupError, Simulation, Threads};
+use colluvium_tests::{bed, material, step};
 use nalgebra::Vector3;
-use std::ops::ControlFlow;
 
 /// A sheared bed on a slope of 33°, in units of d = m = g = 1.
 ///
@@ -16,44 +12,12 @@ use std::ops::ControlFlow;
 /// If the bed cannot be prepared.
 pub fn sheared_bed(
     grains: usize,
-    [length, width]: [f64; 2],
+    floor: [f64; 2],
     beta: Option<f64>,
     threads: Threads,
 ) -> Result<Simulation, SetupError> {
-    let law = ContactLaw {
-        normal: Hooke {
-            stiffness: 2e4,
-            restitution: 0.5,
-        },
-        tangential: TangentialSpring {
-            stiffness_ratio: 2.0 / 7.0,
-            restitution: 0.5,
-            friction: 1.0,
-        },
-        rolling: beta.map(|beta| ShapeParameter {
-            beta,
-            rolling_friction: 1.05,
-            twisting_friction: 1.3,
-        }),
-        lever: Lever::ContactPoint,
-    };
-    let step = timestep::step(1.0, law.normal.stiffness, 30.0);
-    let spec = InclineBed {
-        grains,
-        radius: RadiusLaw::Gaussian {
-            mean: 0.5,
-            relative_deviation: 0.1,
-            cut: 1.0,
-        },
-        density: 6.0 / std::f64::consts::PI,
-        length,
-        width,
-        law,
-        gravity: 1.0,
-        timestep: step,
-        seed: 1,
-    };
-    let bed = settle_incline_bed(&spec, threads, &mut |_| ControlFlow::Continue(()))?;
+    let law = material(beta);
+    let bed = bed(law, grains, floor, 1)?;
     let slope = 33_f64.to_radians();
     let mut simulation = Simulation::new(Setup {
         domain: bed.domain,
@@ -61,7 +25,7 @@ pub fn sheared_bed(
         law,
         grains: bed.grains,
         planes: Vec::new(),
-        timestep: step,
+        timestep: step(),
         threads,
     })?;
     simulation.give_velocity(|g| Vector3::new(0.6 * g.position.z.max(0.0), 0.0, 0.0));
