@@ -152,12 +152,17 @@ pub fn execute(line: CommandLine) -> Result<(), Failure> {
         }
         Command::Check { scene } => {
             let checked = scene.load()?;
+            run::check(&checked)?;
             print(&format!(
                 "{}: a valid `{}` scene",
                 scene.scene, checked.name
             ));
         }
-        Command::Plan { scene } => print(plan::plan(&scene.load()?)?.trim_end()),
+        Command::Plan { scene } => {
+            let checked = scene.load()?;
+            run::check(&checked)?;
+            print(plan::plan(&checked)?.trim_end());
+        }
         Command::Run { scene, how } => {
             say(&run::run(&scene.load()?, &how.options())?)?;
         }

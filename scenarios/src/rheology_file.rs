@@ -235,3 +235,26 @@ pub fn drop_stale_notes(below: &mut Table, above: &Table) {
         below.remove("source");
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    fn law(mu_s: f64, mu_2: f64, i_0: f64) -> RheologyFile {
+        toml::from_str(&format!(
+            "mu_s = {mu_s:e}\nmu_2 = {mu_2:e}\ni_0 = {i_0:e}\ndiameter = 0.01\nsolid_fraction = 0.5\n"
+        ))
+        .unwrap()
+    }
+
+    #[test]
+    fn a_law_that_can_be_written_can_be_read() {
+        // A fit whose μ_2 and I_0 run away together is still a law.
+        assert_eq!(law(0.5, 40.0, 1e3).check(), Ok(()));
+        for bad in [law(-0.1, 0.8, 0.3), law(0.5, 0.4, 0.3), law(0.5, 1e9, 0.3)] {
+            assert!(bad.check().is_err(), "{bad:?}");
+        }
+        let again: RheologyFile = toml::from_str(&law(0.5, 40.0, 1e3).to_toml()).unwrap();
+        assert_eq!(again, law(0.5, 40.0, 1e3));
+    }
+}

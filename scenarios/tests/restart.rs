@@ -144,6 +144,43 @@ fn an_interruption_while_the_bed_settles_says_that_nothing_was_saved() {
 }
 
 #[test]
+fn a_campaign_without_a_law_says_so_and_keeps_its_results() {
+    let folder = tempfile::tempdir().unwrap();
+    // Too shallow and too short for a single point away from base and surface.
+    let sets = [
+        "scale=0.85",
+        "grains.count=400",
+        "contact.stiffness_scaled=1e3",
+        "time.relax=0.1",
+        "time.average=0.15",
+        "time.limit=0.3",
+        "calibration.flow_degrees=[33, 36]",
+        "calibration.search_time=0.1",
+        "calibration.stop.resolution=8",
+        "calibration.onset.resolution=10",
+        "calibration.compare_degrees=[33, 50]",
+    ];
+    let mut arguments = vec!["calibrate", "incline-moderate", "--out", "c"];
+    for set in sets {
+        arguments.extend(["--set", set]);
+    }
+    let done = colluvium(folder.path(), &arguments);
+    let message = String::from_utf8_lossy(&done.stderr);
+    assert_eq!(done.status.code(), Some(0), "{message}");
+    assert!(
+        message.contains("No rheology.toml was written"),
+        "{message}"
+    );
+    let c = folder.path().join("c");
+    assert!(!c.join("rheology.toml").exists() && c.join("campaign.json").exists());
+    let summary = summary(&c);
+    assert_eq!(summary["status"], "done");
+    assert_eq!(summary["results"]["good"]["value"], 0.0);
+    let remarks = summary["remarks"].to_string();
+    assert!(remarks.contains("No rheology.toml") && remarks.contains("not compared"));
+}
+
+#[test]
 fn a_stopped_campaign_keeps_its_angles_and_ends_the_same() {
     let folder = tempfile::tempdir().unwrap();
     // Deep enough to have layers away from base and surface.
