@@ -234,7 +234,7 @@ fn compare(e: &Evidence, material: &str, text: &mut Vec<String>) {
             "Where this is more than one joint error, these are possible reasons: the thesis prints neither \
              its height, box, stiffness nor time step, and ours are our own; it takes mu = tan theta where we \
              measure |tau|/p with p = trace/3, higher by the normal stress differences (5 to 10 %); its flows \
-             start from a falling cloud; its I is one number per flow, ours one per layer, without the top 2 d \
+             start from a falling cloud; its I is one number per flow, ours one per layer, without the top 4 d \
              and the base 3 d; our flows are a few hundred diameters of shear long and may still drift."
                 .into(),
         );
