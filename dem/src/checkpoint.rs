@@ -55,6 +55,7 @@ impl Simulation {
         numbers("planes/history", flatten(&histories));
         numbers("planes/clearance", walls.clearance().to_vec());
         numbers("wall_impulse", self.impulse.to_vec());
+        numbers("momentum_account", self.account.iter().copied().collect());
         numbers("largest_overlap", vec![self.deepest]);
         numbers("gravity", self.gravity.iter().copied().collect());
         let mut counts = |name: &str, values: Vec<u64>| {
@@ -169,6 +170,7 @@ impl Simulation {
         self.list.partner = partner;
         self.list.restore([nx, ny, nz], self.domain.periodic);
         self.grains = grains;
+        self.weigh();
 
         let of = narrow("planes/contact", record.counts("planes/contact")?)?;
         let histories: Vec<[f64; HISTORY_ROLLING]> =
@@ -197,6 +199,7 @@ impl Simulation {
         self.plane_contacts.restore(contacts, clearance, n);
 
         self.impulse.copy_from_slice(sized("wall_impulse", 3)?);
+        self.account = Vector3::from_column_slice(sized("momentum_account", 3)?);
         self.deepest = sized("largest_overlap", 1)?[0];
         self.gravity = Vector3::from_column_slice(sized("gravity", 3)?);
         let &[steps, since_start, springs_current] = record.counts("steps")? else {

@@ -201,6 +201,22 @@ impl Simulation {
         sum
     }
 
+    /// How far the momentum of grains and walls is from that of the start plus gravity's, relative to
+    /// the largest of the terms: round-off, unless a force had no counterforce.
+    pub fn momentum_error(&mut self) -> f64 {
+        let (held, taken) = (self.leapfrog_momentum(), self.wall_impulse());
+        let free = (0..self.grains.len()).filter(|&i| !self.grains.is_fixed(i));
+        let size: f64 = free
+            .map(|i| self.grains.mass[i] * vector(&self.grains.motion[i]).norm())
+            .sum();
+        let scale = size.max(taken.norm()).max(self.account.norm());
+        if scale > 0.0 {
+            (held + taken - self.account).norm() / scale
+        } else {
+            0.0
+        }
+    }
+
     /// Angular momentum of the free grains about the origin, spins included, as the integrator holds
     /// it: positions now, velocities half a step back (N m s). Without walls, gravity and periodic axes
     /// it is conserved to round-off.

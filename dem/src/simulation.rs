@@ -118,6 +118,11 @@ pub struct Simulation {
     row_results: Vec<RowResult>,
     /// Momentum taken by fixed grains and planes since the start (N s).
     pub(crate) impulse: [f64; 3],
+    /// Momentum that grains and walls together must hold by now: that of the start plus what gravity
+    /// gave (N s).
+    pub(crate) account: Vector3<f64>,
+    /// Mass of the free grains (kg).
+    weighed: f64,
     /// Whether slots hold the forces of the present positions.
     current: bool,
     /// Whether springs are already stretched to the present positions.
@@ -136,6 +141,7 @@ impl Simulation {
     pub fn new(setup: Setup) -> Result<Simulation, SetupError> {
         let mut simulation = Simulation::unlisted(setup)?;
         simulation.rebuild();
+        simulation.open_account();
         Ok(simulation)
     }
 
@@ -163,6 +169,8 @@ impl Simulation {
             plane_contacts: PlaneContacts::default(),
             row_results: Vec::new(),
             impulse: [0.0; 3],
+            account: Vector3::zeros(),
+            weighed: 0.0,
             current: false,
             springs_current: false,
             before: Springs::default(),
@@ -277,6 +285,7 @@ impl Simulation {
                 self.impulse[k] -= kick * contact.slot[0][k];
             }
         }
+        self.account += self.weighed * kick * self.gravity;
         self.list.age += self.timestep;
         self.reach.age += self.timestep;
         for (r, row) in self.row_results.iter().enumerate() {
@@ -422,6 +431,7 @@ impl Simulation {
             // The row's drift was the mean of other velocities: let the bound start afresh.
             self.store_history();
             self.rebuild();
+            self.open_account();
         }
     }
 
@@ -430,6 +440,18 @@ impl Simulation {
         self.steps_since_start = 0;
         self.store_history();
         self.rebuild();
+        self.open_account();
+    }
+
+    /// Starts the momentum account with what there is now.
+    fn open_account(&mut self) {
+        self.weigh();
+        self.account = self.leapfrog_momentum() + self.wall_impulse();
+    }
+
+    /// Notes the mass that gravity acts on.
+    pub(crate) fn weigh(&mut self) {
+        self.weighed = self.free_mass();
     }
 
     /// Time since the start (s).

@@ -173,6 +173,7 @@ fn walls_and_gravity_account_for_all_momentum() {
     let given = weight * (2000.0 * s.timestep());
     let error = (after - before - given).norm() / given.norm();
     assert!(error < 1e-11, "{error:e}");
+    assert!(s.momentum_error() < 1e-12, "{:e}", s.momentum_error());
     // Without what the base took the balance must fail.
     assert!((s.leapfrog_momentum() - before - given).norm() / given.norm() > 0.1);
 }

@@ -213,6 +213,7 @@ pub(super) fn run(scene: &InclineScene, under: &mut Under) -> Result<Findings, F
     bar.clear();
     let energy = run.simulation().energy();
     let grains = grain_table(&mut run);
+    let momentum_error = run.simulation().momentum_error();
     let result = run.finish();
     let mut summary = Summary::begun(&under.scene.name, "run");
     summary.model = model(scene, &bed);
@@ -226,6 +227,7 @@ pub(super) fn run(scene: &InclineScene, under: &mut Under) -> Result<Findings, F
         summary.ledger.energy.insert(name.into(), value);
     }
     describe(&mut summary, scene, &result, &bed);
+    summary.ledger.momentum_relative = Some(momentum_error);
     let mut tables = vec![energy_table(&result.series)];
     if let Some(profile) = &result.profile {
         tables.push(profile_table("profile", profile));
@@ -256,7 +258,6 @@ fn describe(summary: &mut Summary, scene: &InclineScene, result: &InclineResult,
     summary.state_hash = result.state_hash.clone();
     if let Some(checks) = &result.checks {
         summary.ledger.mass_relative = checks.mass_relative;
-        summary.ledger.momentum_relative = Some(checks.normal_relative);
         summary.put(
             "weight_error",
             Quantity::new(checks.weight_relative, "1").against(
