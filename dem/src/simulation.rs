@@ -183,6 +183,14 @@ impl Simulation {
 
     /// Integrates `steps` steps.
     pub fn advance(&mut self, steps: u64) -> Result<(), Diverged> {
+        if self.parallel && rayon::current_thread_index().is_none() {
+            // From outside the pool every split of a step would be handed over: enter it once.
+            return rayon::scope(|_| self.advance_here(steps));
+        }
+        self.advance_here(steps)
+    }
+
+    fn advance_here(&mut self, steps: u64) -> Result<(), Diverged> {
         for _ in 0..steps {
             self.step()?;
         }
