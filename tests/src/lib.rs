@@ -1,5 +1,9 @@
 //! Fixtures shared by the tests across crates: materials, beds, other codes' figures.
 
+mod starts;
+
+pub use starts::{StartError, chute_start, read_start, settle_start, settled_start};
+
 use colluvium_coupling::incline::{InclineSpec, Purpose, Start};
 use colluvium_dem::preparation::{Bed, InclineBed, RadiusLaw, settle_incline_bed};
 use colluvium_dem::{
