@@ -1,10 +1,11 @@
 //! Checkpoints: a simulation taken apart into arrays and put together again, bit for bit.
 //!
 //! The Verlet list is part of the state: its order decides the order of sums, and its age when it is
-//! built again. The shorter list of pairs within reach is not: it changes no bits.
+//! built again. The shorter list of pairs within reach is not: it changes no bits. Only contacts that
+//! touch have a history.
 
 use crate::contact::HISTORY_ROLLING;
-use crate::grains::Grains;
+use crate::grains::{Grains, Next};
 use crate::neighbours::Row;
 use crate::planes::PlaneContact;
 use crate::record::Record;
@@ -34,7 +35,6 @@ impl Simulation {
     /// The whole state. Going on from it gives the same bits as going on without it.
     pub fn checkpoint(&mut self) -> Record {
         self.forget_observation();
-        self.store_history();
         self.fold_impulses();
         let n = self.grains.len();
         let mut record = Record::default();
@@ -45,7 +45,12 @@ impl Simulation {
         numbers("grains/motion", flatten(&self.grains.motion[..n]));
         numbers("grains/turn", flatten(&self.grains.turn[..n]));
         numbers("grains/mass", self.grains.mass.clone());
-        numbers("list/history", self.list.history.clone());
+        let (mut pairs, mut springs) = (Vec::new(), Vec::new());
+        self.reach.touching(self.law.history(), |i, j, history| {
+            pairs.extend([u64::from(i), u64::from(j)]);
+            springs.extend_from_slice(history);
+        });
+        numbers("contacts/history", springs);
         let drifts: Vec<_> = self.list.rows.iter().map(|r| r.drift).collect();
         numbers("list/row_drift", flatten(&drifts));
         numbers("list/travel", self.list.travel.clone());
@@ -62,6 +67,7 @@ impl Simulation {
             record.counts.insert(name.into(), values);
         };
         counts("grains/id", wide(&self.grains.id));
+        counts("contacts/pair", pairs);
         counts("list/first", wide(&self.list.first));
         counts("list/partner", wide(&self.list.partner));
         let ends: Vec<u32> = self.list.rows.iter().map(|r| r.end).collect();
@@ -88,8 +94,6 @@ impl Simulation {
     pub fn resume(setup: Setup, record: &Record) -> Result<Simulation, SetupError> {
         let mut s = Simulation::unlisted(setup)?;
         s.read(record).map_err(SetupError::Record)?;
-        s.renew_rows();
-        s.renew_reach();
         Ok(s)
     }
 
@@ -112,6 +116,7 @@ impl Simulation {
             turn: rows(sized("grains/turn", 4 * n)?),
             mass: sized("grains/mass", n)?.to_vec(),
             id: narrow("grains/id", record.counts("grains/id")?)?,
+            next: Next::default(),
         };
         if grains.id.len() != n || grains.id.iter().any(|&id| id as usize >= n) {
             return Err("array `grains/id` does not number the grains of this scene".into());
@@ -136,8 +141,16 @@ impl Simulation {
         if first.len() != n + 1 || !rising || first[n] as usize != partner.len() || !ordered() {
             return Err("arrays `list/first` and `list/partner` do not fit each other".into());
         }
-        let width = self.law.history();
-        self.list.history = sized("list/history", width * partner.len())?.to_vec();
+        let touching = narrow("contacts/pair", record.counts("contacts/pair")?)?;
+        let touching = touching.as_chunks::<2>().0;
+        let listed = |&[i, j]: &[u32; 2]| {
+            let own = (i as usize) < n;
+            own && partner[first[i as usize] as usize..first[i as usize + 1] as usize].contains(&j)
+        };
+        if !touching.iter().all(listed) {
+            return Err("array `contacts/pair` has a pair that is not in `list/partner`".into());
+        }
+        let springs = sized("contacts/history", self.law.history() * touching.len())?;
         let ends = narrow("list/row_end", record.counts("list/row_end")?)?;
         let drifts: Vec<[f64; 3]> = rows(sized("list/row_drift", 3 * ends.len())?);
         let cells: Vec<usize> = record
@@ -207,6 +220,8 @@ impl Simulation {
         };
         (self.steps, self.steps_since_start) = (steps, since_start);
         self.springs_current = springs_current != 0;
+        self.renew_rows();
+        self.take_histories(touching, springs);
         Ok(())
     }
 }

@@ -1,15 +1,12 @@
-//! The force pass: all pairs within reach, four at a time.
+//! Forces of four pairs at a time.
 //!
-//! Reads positions and velocities, writes each pair's slot and history, touches nothing else: any
-//! split over threads gives the same bits.
+//! Reads positions and velocities, writes each pair's slot and history, touches nothing else.
 
 use crate::contact::{HISTORY_ROLLING, Interaction, Lever, Step, Touch, Wrench};
 use crate::domain::Images;
-use crate::grains::Grains;
-use crate::lanes::{Lanes4, Portable, Vec3, has_avx2};
-use crate::reach::Reach;
+use crate::lanes::{Lanes4, Vec3};
 
-/// What the pass reads.
+/// What forces are made of.
 #[derive(Clone, Copy)]
 pub(crate) struct Field<'a> {
     pub place: &'a [[f64; 4]],
@@ -25,101 +22,9 @@ pub(crate) const fn slot_rows<I: Interaction>() -> usize {
     if I::ROLLING { 3 } else { 2 }
 }
 
-/// Batches that one task works on at least.
-const BATCHES_A_TASK: usize = 256;
-
-/// Evaluates the law on all pairs within reach; the largest overlap over the harmonic mean radius.
-pub(crate) fn evaluate<I: Interaction>(
-    law: &I,
-    grains: &Grains,
-    field: &Field,
-    reach: &mut Reach,
-    parallel: bool,
-) -> f64 {
-    debug_assert_eq!(field.place.len(), grains.len() + 1);
-    let task = Task {
-        i: &reach.i,
-        j: &reach.j,
-        history: &mut reach.history,
-        slots: &mut reach.slots,
-    };
-    task.run(law, field, parallel, has_avx2())
-}
-
-struct Task<'a> {
-    i: &'a [u32],
-    j: &'a [u32],
-    history: &'a mut [[f64; 4]],
-    slots: &'a mut [[f64; 4]],
-}
-
-impl Task<'_> {
-    fn run<I: Interaction>(self, law: &I, field: &Field, parallel: bool, wide: bool) -> f64 {
-        let batches = self.i.len() / 4;
-        if parallel && batches >= 2 * BATCHES_A_TASK {
-            let half = batches / 2;
-            let (i0, i1) = self.i.split_at(4 * half);
-            let (j0, j1) = self.j.split_at(4 * half);
-            let (h0, h1) = self.history.split_at_mut(I::HISTORY * half);
-            let (s0, s1) = self.slots.split_at_mut(slot_rows::<I>() * 4 * half);
-            let left = Task {
-                i: i0,
-                j: j0,
-                history: h0,
-                slots: s0,
-            };
-            let right = Task {
-                i: i1,
-                j: j1,
-                history: h1,
-                slots: s1,
-            };
-            let (a, b) = rayon::join(
-                || left.run(law, field, parallel, wide),
-                || right.run(law, field, parallel, wide),
-            );
-            return a.max(b);
-        }
-        #[cfg(target_arch = "x86_64")]
-        if wide {
-            // SAFETY: `wide` is only set when the processor has AVX2.
-            return unsafe { batches_avx2(law, field, self) };
-        }
-        let _ = wide;
-        batches_in::<Portable, I>(law, field, self)
-    }
-}
-
-/// The pass compiled for AVX2.
-///
-/// # Safety
-/// The processor must have AVX2.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-unsafe fn batches_avx2<I: Interaction>(law: &I, field: &Field, task: Task) -> f64 {
-    batches_in::<crate::lanes::avx2::Avx2, I>(law, field, task)
-}
-
+/// Evaluates the law on four pairs.
 #[inline(always)]
-fn batches_in<L: Lanes4, I: Interaction>(law: &I, field: &Field, task: Task) -> f64 {
-    let rows = slot_rows::<I>();
-    let mut deepest = L::splat(0.0);
-    let batches = task
-        .i
-        .chunks_exact(4)
-        .zip(task.j.chunks_exact(4))
-        .zip(task.history.chunks_exact_mut(I::HISTORY))
-        .zip(task.slots.chunks_exact_mut(4 * rows));
-    for (((i, j), history), slots) in batches {
-        batch::<L, I>(law, field, i, j, history, slots, &mut deepest);
-    }
-    let mut out = [0.0; 4];
-    deepest.store(&mut out);
-    out.iter().fold(0.0, |a: f64, &b| a.max(b))
-}
-
-#[inline(always)]
-fn batch<L: Lanes4, I: Interaction>(
+pub(crate) fn batch<L: Lanes4, I: Interaction>(
     law: &I,
     field: &Field,
     i: &[u32],

@@ -57,6 +57,19 @@ pub(crate) struct Grains {
     pub mass: Vec<f64>,
     /// Number given at the start.
     pub id: Vec<u32>,
+    /// Rows in the making.
+    pub next: Next,
+}
+
+/// Where a step or a sort writes: steps read old rows and write new ones, so that threads share the
+/// old ones freely.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Next {
+    pub place: Vec<[f64; 4]>,
+    pub motion: Vec<[f64; 4]>,
+    pub turn: Vec<[f64; 4]>,
+    mass: Vec<f64>,
+    id: Vec<u32>,
 }
 
 impl Grains {
@@ -75,11 +88,19 @@ impl Grains {
         state
     }
 
-    /// Puts the dummy behind the last grain.
+    /// Puts the dummy behind the last grain and makes room for a step.
     pub fn pad(&mut self) {
         self.place.push([0.0; 4]);
         self.motion.push([0.0; 4]);
         self.turn.push([0.0; 4]);
+        let rows = self.place.len();
+        for next in [
+            &mut self.next.place,
+            &mut self.next.motion,
+            &mut self.next.turn,
+        ] {
+            next.resize(rows, [0.0; 4]);
+        }
     }
 
     /// Number of real grains.
@@ -92,31 +113,34 @@ impl Grains {
     }
 
     /// Reorders all rows so that new grain `k` is old grain `order(k)`.
-    pub fn reorder(&mut self, order: &[u32], scratch: &mut Grains) {
-        let n = self.len();
-        scratch.place.clear();
-        scratch.motion.clear();
-        scratch.turn.clear();
-        scratch.mass.clear();
-        scratch.id.clear();
-        scratch
-            .place
-            .extend(order.iter().map(|&o| self.place[o as usize]));
-        scratch
-            .motion
-            .extend(order.iter().map(|&o| self.motion[o as usize]));
-        scratch
-            .turn
-            .extend(order.iter().map(|&o| self.turn[o as usize]));
-        scratch
-            .mass
-            .extend(order.iter().map(|&o| self.mass[o as usize]));
-        scratch
+    pub fn reorder(&mut self, order: &[u32]) {
+        for (rows, next) in [
+            (&mut self.place, &mut self.next.place),
+            (&mut self.motion, &mut self.next.motion),
+            (&mut self.turn, &mut self.next.turn),
+        ] {
+            next.clear();
+            next.reserve_exact(order.len() + 1);
+            next.extend(order.iter().map(|&o| rows[o as usize]));
+            next.push([0.0; 4]);
+            std::mem::swap(rows, next);
+        }
+        self.next.mass.clear();
+        let masses = order.iter().map(|&o| self.mass[o as usize]);
+        self.next.mass.extend(masses);
+        std::mem::swap(&mut self.mass, &mut self.next.mass);
+        self.next.id.clear();
+        self.next
             .id
             .extend(order.iter().map(|&o| self.id[o as usize]));
-        scratch.pad();
-        debug_assert_eq!(scratch.len(), n);
-        std::mem::swap(self, scratch);
+        std::mem::swap(&mut self.id, &mut self.next.id);
+    }
+
+    /// Makes the rows that a step has written the present ones.
+    pub fn turn_over(&mut self) {
+        std::mem::swap(&mut self.place, &mut self.next.place);
+        std::mem::swap(&mut self.motion, &mut self.next.motion);
+        std::mem::swap(&mut self.turn, &mut self.next.turn);
     }
 }
 

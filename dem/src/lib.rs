@@ -10,6 +10,7 @@
 
 mod checkpoint;
 pub mod contact;
+mod contacts;
 mod domain;
 mod energy;
 mod forces;
@@ -26,6 +27,7 @@ mod setup;
 mod simulation;
 mod snapshot;
 mod state_hash;
+mod sweep;
 pub mod timestep;
 
 pub use contact::{ContactLaw, Hooke, Lever, ShapeParameter, TangentialSpring};

@@ -1,4 +1,4 @@
-//! The motion pass: each grain gathers its slots, is kicked and drifts.
+//! Moving a grain: it gathers its slots, is kicked and drifts.
 //!
 //! ```text
 //! v(n+1/2) = v(n-1/2) + dt (F(n)/m + g)        x(n+1) = x(n) + dt v(n+1/2)
@@ -6,19 +6,109 @@
 //! ```
 //! Leap-frog. The moment of the tangential force is stored as `n × F_t`-type vectors T without the
 //! radius, which cancels: `d(Rω)/dt = 5/(2m) (T + M/R)`.
+//!
+//! Order of a grain's sum: its pairs as `i` in list order, then its pairs as `j` from the last to the
+//! first, then planes. Pairs of earlier chunks thus come last among pairs, whatever the cuts.
 
-use crate::grains::{Grains, SPHERE_INERTIA};
-use crate::lanes::{Lanes4, Portable, has_avx2};
-use crate::neighbours::Row;
+use crate::grains::SPHERE_INERTIA;
+use crate::lanes::{Lanes4, Portable};
 use crate::planes::PlaneContacts;
-use crate::reach::Reach;
+use crate::reach::{Chunk, Reach, SHARES, Shared};
 
-/// What the pass reads beside the grains themselves.
+/// Slots of all pairs are there: no place is used twice.
+pub(crate) const ALL: usize = usize::MAX;
+
+/// Force, moment of the tangential force, further moment on a grain.
 #[derive(Clone, Copy)]
-pub(crate) struct Pull<'a> {
-    pub reach: &'a Reach,
-    pub planes: &'a PlaneContacts,
-    pub slot_rows: usize,
+pub(crate) struct Sum<L>(pub [L; 3]);
+
+/// Sums over a chunk's own pairs for the grains from `from` to `to` (of the chunk); `mask` says where
+/// in `slots` a pair's slot is.
+///
+/// One loop over the terms of all grains without a branch in it: loops over the few terms of each
+/// grain end unpredictably, which costs more than the sums.
+#[inline(always)]
+pub(crate) fn sums<L: Lanes4, const ROWS: usize>(
+    chunk: &Chunk,
+    [from, to]: [usize; 2],
+    mask: usize,
+    sums: &mut [[[f64; 4]; ROWS]],
+) {
+    let zero = L::splat(0.0);
+    let mut sum = [zero; ROWS];
+    let slots = chunk.slots.as_chunks::<ROWS>().0;
+    let terms = chunk.first_term[from] as usize..chunk.first_term[to] as usize;
+    let mut next = 0;
+    for &term in &chunk.terms[terms] {
+        let slot = &slots[term.pair() & mask];
+        let [force, torque] = SHARES[term.share()];
+        next += term.first();
+        let fresh = zero.less(L::splat([0.0, 1.0][term.first()]));
+        let out = &mut sums[next - 1];
+        for row in 0..ROWS {
+            let share = L::splat(if row == 1 { torque } else { force });
+            sum[row] = L::select(fresh, zero, sum[row]) + L::load(&slot[row]) * share;
+            sum[row].store(&mut out[row]);
+        }
+    }
+}
+
+impl<L: Lanes4> Sum<L> {
+    /// Adds the pairs of earlier chunks to shared grain `s` of a chunk.
+    #[inline(always)]
+    pub fn import(&mut self, chunks: &[Chunk], chunk: &Chunk, s: usize, rows: usize) {
+        let end = match chunk.shared.get(s + 1) {
+            Some(next) => next.first_import as usize,
+            None => chunk.imports.len(),
+        };
+        for import in &chunk.imports[chunk.shared[s].first_import as usize..end] {
+            let exports = &chunks[import.chunk as usize].exports;
+            self.subtract(&exports[import.export as usize * rows..][..rows]);
+        }
+    }
+
+    /// Adds the planes.
+    #[inline(always)]
+    pub fn lean(&mut self, planes: &PlaneContacts, grain: usize) {
+        for contact in planes.of(grain) {
+            self.add(&contact.slot);
+        }
+    }
+
+    #[inline(always)]
+    fn add(&mut self, slot: &[[f64; 4]]) {
+        self.0[0] = self.0[0] + L::load(&slot[0]);
+        self.0[1] = self.0[1] + L::load(&slot[1]);
+        if slot.len() == 3 {
+            self.0[2] = self.0[2] + L::load(&slot[2]);
+        }
+    }
+
+    /// The other side of a pair: force and further moment are opposite, the moment of the
+    /// tangential force is the same.
+    #[inline(always)]
+    fn subtract(&mut self, slot: &[[f64; 4]]) {
+        self.0[0] = self.0[0] - L::load(&slot[0]);
+        self.0[1] = self.0[1] + L::load(&slot[1]);
+        if slot.len() == 3 {
+            self.0[2] = self.0[2] - L::load(&slot[2]);
+        }
+    }
+
+    /// A sum from its rows; without a third one there is no further moment.
+    #[inline(always)]
+    pub fn load(rows: &[[f64; 4]]) -> Self {
+        let mut sum = Sum([L::load(&rows[0]), L::load(&rows[1]), L::splat(0.0)]);
+        if rows.len() == 3 {
+            sum.0[2] = L::load(&rows[2]);
+        }
+        sum
+    }
+}
+
+/// How grains move in a step.
+#[derive(Clone, Copy)]
+pub(crate) struct Motion {
     /// Gravity (m/s²) and a zero.
     pub gravity: [f64; 4],
     /// Time over which forces act (s): half a step at the start of a run, else a step.
@@ -27,182 +117,54 @@ pub(crate) struct Pull<'a> {
     pub drift: f64,
 }
 
-/// What the pass leaves for each row of grains.
-#[derive(Clone, Copy, Debug, Default)]
-pub(crate) struct RowResult {
-    /// Largest speed against the row's drift (m/s).
-    pub fluctuation: f64,
-    /// Momentum that fixed grains of the row have taken from free ones (N s).
-    pub impulse: [f64; 3],
+/// A grain's rows of place, motion and turn.
+pub(crate) struct Body<L>(pub [L; 3]);
+
+impl<L: Lanes4> Body<L> {
+    /// The same grain a step later.
+    #[inline(always)]
+    pub fn moved(self, sum: &Sum<L>, motion: &Motion) -> Self {
+        let Body([place, velocity, turn]) = self;
+        let Sum([force, torque, moment]) = *sum;
+        let zero = L::splat(0.0);
+        let kick = L::splat(motion.kick);
+        let drift = L::load(&[motion.drift, motion.drift, motion.drift, 0.0]);
+        let spin_up = L::splat(1.0 / SPHERE_INERTIA);
+        let inverse_mass = velocity.splat_last();
+        let fall = L::select(zero.less(inverse_mass), L::load(&motion.gravity), zero);
+        let moved = velocity + kick * (force * inverse_mass + fall);
+        let turned = kick * spin_up * inverse_mass * (torque + moment * turn.splat_last());
+        Body([place + drift * moved, moved, turn + turned])
+    }
 }
 
-/// Grains that one task works on at least.
-const GRAINS_A_TASK: usize = 512;
-
-/// Moves all grains by one step.
-pub(crate) fn advance(
-    grains: &mut Grains,
-    rows: &[Row],
-    pull: &Pull,
-    results: &mut [RowResult],
-    parallel: bool,
-) {
-    let n = grains.len();
-    let task = Task {
-        from: 0,
-        place: &mut grains.place[..n],
-        motion: &mut grains.motion[..n],
-        turn: &mut grains.turn[..n],
-        rows,
-        results,
+/// Force and both moments on a grain at this instant, gathered in the order of a step.
+pub(crate) fn gather(
+    reach: &Reach,
+    planes: &PlaneContacts,
+    rows: usize,
+    g: usize,
+) -> [[f64; 4]; 3] {
+    let chunk = reach.chunk_of(g);
+    let own = g - chunk.grains.start;
+    let own = [own, own + 1];
+    let mut sum = if rows == 2 {
+        let mut two = [[[0.0; 4]; 2]];
+        sums::<Portable, 2>(chunk, own, ALL, &mut two);
+        Sum::<Portable>::load(&two[0])
+    } else {
+        let mut three = [[[0.0; 4]; 3]];
+        sums::<Portable, 3>(chunk, own, ALL, &mut three);
+        Sum::load(&three[0])
     };
-    task.run(pull, parallel, has_avx2());
-}
-
-/// Force and both moments on a grain at this instant, gathered in the pass's own order.
-pub(crate) fn gather(pull: &Pull, grain: usize) -> [[f64; 4]; 3] {
-    let [f, t, m] = gather_lanes::<Portable>(pull, grain);
+    let shared = |s: &Shared| s.grain as usize;
+    if let Ok(s) = chunk.shared.binary_search_by_key(&g, shared) {
+        sum.import(&reach.chunks, chunk, s, rows);
+    }
+    sum.lean(planes, g);
     let mut out = [[0.0; 4]; 3];
-    f.store(&mut out[0]);
-    t.store(&mut out[1]);
-    m.store(&mut out[2]);
+    for (out, sum) in out.iter_mut().zip(sum.0) {
+        sum.store(out);
+    }
     out
-}
-
-struct Task<'a> {
-    /// Number of the first grain of the slices.
-    from: usize,
-    place: &'a mut [[f64; 4]],
-    motion: &'a mut [[f64; 4]],
-    turn: &'a mut [[f64; 4]],
-    rows: &'a [Row],
-    results: &'a mut [RowResult],
-}
-
-impl Task<'_> {
-    fn run(self, pull: &Pull, parallel: bool, wide: bool) {
-        if parallel && self.place.len() >= 2 * GRAINS_A_TASK && self.rows.len() > 1 {
-            let half = self.from + self.place.len() / 2;
-            let row = self
-                .rows
-                .partition_point(|r| (r.end as usize) <= half)
-                .clamp(1, self.rows.len() - 1);
-            let at = self.rows[row].start as usize - self.from;
-            let (p0, p1) = self.place.split_at_mut(at);
-            let (m0, m1) = self.motion.split_at_mut(at);
-            let (t0, t1) = self.turn.split_at_mut(at);
-            let (r0, r1) = self.rows.split_at(row);
-            let (q0, q1) = self.results.split_at_mut(row);
-            let left = Task {
-                from: self.from,
-                place: p0,
-                motion: m0,
-                turn: t0,
-                rows: r0,
-                results: q0,
-            };
-            let right = Task {
-                from: self.from + at,
-                place: p1,
-                motion: m1,
-                turn: t1,
-                rows: r1,
-                results: q1,
-            };
-            rayon::join(
-                || left.run(pull, parallel, wide),
-                || right.run(pull, parallel, wide),
-            );
-            return;
-        }
-        #[cfg(target_arch = "x86_64")]
-        if wide {
-            // SAFETY: `wide` is only set when the processor has AVX2.
-            unsafe { rows_avx2(self, pull) };
-            return;
-        }
-        let _ = wide;
-        rows_in::<Portable>(self, pull);
-    }
-}
-
-/// The pass compiled for AVX2.
-///
-/// # Safety
-/// The processor must have AVX2.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-unsafe fn rows_avx2(task: Task, pull: &Pull) {
-    rows_in::<crate::lanes::avx2::Avx2>(task, pull);
-}
-
-#[inline(always)]
-fn gather_lanes<L: Lanes4>(pull: &Pull, grain: usize) -> [L; 3] {
-    let (reach, rows) = (pull.reach, pull.slot_rows);
-    let (mut force, mut torque, mut moment) = (L::splat(0.0), L::splat(0.0), L::splat(0.0));
-    let own = reach.first_own[grain] as usize..reach.first_own[grain + 1] as usize;
-    for slot in reach.slots[own.start * rows..own.end * rows].chunks_exact(rows) {
-        force = force + L::load(&slot[0]);
-        torque = torque + L::load(&slot[1]);
-        if rows == 3 {
-            moment = moment + L::load(&slot[2]);
-        }
-    }
-    let other = reach.first_other[grain] as usize..reach.first_other[grain + 1] as usize;
-    for &k in &reach.other[other] {
-        let slot = &reach.slots[k as usize * rows..][..rows];
-        force = force - L::load(&slot[0]);
-        torque = torque + L::load(&slot[1]);
-        if rows == 3 {
-            moment = moment - L::load(&slot[2]);
-        }
-    }
-    for contact in pull.planes.of(grain) {
-        force = force + L::load(&contact.slot[0]);
-        torque = torque + L::load(&contact.slot[1]);
-        moment = moment + L::load(&contact.slot[2]);
-    }
-    [force, torque, moment]
-}
-
-#[inline(always)]
-fn rows_in<L: Lanes4>(task: Task, pull: &Pull) {
-    let zero = L::splat(0.0);
-    let kick = L::splat(pull.kick);
-    let drift = L::load(&[pull.drift, pull.drift, pull.drift, 0.0]);
-    let gravity = L::load(&pull.gravity);
-    let spin_up = L::splat(1.0 / SPHERE_INERTIA);
-    for (row, result) in task.rows.iter().zip(task.results) {
-        let mut fastest = 0.0_f64;
-        for g in row.start as usize..row.end as usize {
-            let k = g - task.from;
-            let [force, torque, moment] = gather_lanes::<L>(pull, g);
-            let velocity = L::load(&task.motion[k]);
-            let turn = L::load(&task.turn[k]);
-            let inverse_mass = velocity.splat_last();
-            let fall = L::select(zero.less(inverse_mass), gravity, zero);
-            let moved = velocity + kick * (force * inverse_mass + fall);
-            moved.store(&mut task.motion[k]);
-            let turned = kick * spin_up * inverse_mass * (torque + moment * turn.splat_last());
-            (turn + turned).store(&mut task.turn[k]);
-            (L::load(&task.place[k]) + drift * moved).store(&mut task.place[k]);
-
-            let v = &task.motion[k];
-            let mut speed2 = 0.0;
-            for (v, w) in v.iter().zip(&row.drift) {
-                speed2 += (v - w) * (v - w);
-            }
-            if speed2 > fastest || speed2.is_nan() {
-                fastest = speed2;
-            }
-            if v[3] == 0.0 {
-                let mut taken = [0.0; 4];
-                (kick * force).store(&mut taken);
-                for (sum, taken) in result.impulse.iter_mut().zip(taken) {
-                    *sum += taken;
-                }
-            }
-        }
-        result.fluctuation = fastest.sqrt();
-    }
 }

@@ -98,15 +98,13 @@ impl Grid {
     }
 }
 
-/// Verlet list with contact history.
+/// Verlet list.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Neighbours {
     /// Pairs of grain i: `first(i)..first[i + 1]`.
     pub first: Vec<u32>,
     /// The partner j > i of each pair.
     pub partner: Vec<u32>,
-    /// History of each pair, `history_width` numbers; zero where the pair does not touch.
-    pub history: Vec<f64>,
     pub rows: Vec<Row>,
     /// T of each row since the build (m).
     pub travel: Vec<f64>,
@@ -125,12 +123,7 @@ struct Build {
     cell_first: Vec<u32>,
     order: Vec<u32>,
     new_index: Vec<u32>,
-    sorted: Grains,
     parts: Vec<Part>,
-    carried: Vec<Carried>,
-    carried_sorted: Vec<Carried>,
-    carried_first: Vec<u32>,
-    old_history: Vec<f64>,
 }
 
 /// Pairs found for a range of rows.
@@ -142,29 +135,17 @@ struct Part {
     scratch: [Vec<usize>; 3],
 }
 
-/// A touching contact on its way to the new list.
-#[derive(Clone, Copy, Debug, Default)]
-struct Carried {
-    i: u32,
-    j: u32,
-    source: u32,
-    swapped: bool,
-}
-
 /// Rows handled by one task of a build: small enough to share, large enough not to matter.
 const ROWS_A_PART: usize = 16;
 
 impl Neighbours {
-    /// Sorts the grains and lists all pairs closer than `R_i + R_j + skin`, keeping histories.
-    ///
-    /// `history_width` numbers a contact; the first six change sign when a pair changes order.
+    /// Sorts the grains and lists all pairs closer than `R_i + R_j + skin`.
     pub fn build(
         &mut self,
         grains: &mut Grains,
         domain: &Domain,
         largest_radius: f64,
         skin: f64,
-        history_width: usize,
         parallel: bool,
     ) {
         let n = grains.len();
@@ -173,11 +154,9 @@ impl Neighbours {
             (x[0], x[1], x[2]) = (wrapped.x, wrapped.y, wrapped.z);
         }
         self.grid = Grid::lay(grains, domain, 2.0 * largest_radius + skin);
-        self.collect_touching(n, history_width);
         self.sort(grains);
         self.lay_rows(grains);
         self.find_pairs(grains, domain, skin, parallel);
-        self.carry_history(n, history_width);
         self.age = 0.0;
     }
 
@@ -189,6 +168,11 @@ impl Neighbours {
     /// The same question for a shorter list that was made later from this one.
     pub fn outdated_since(&self, travel: &[f64], age: f64, skin: f64) -> bool {
         outdated(&self.row_pairs, &self.rows, travel, age, skin)
+    }
+
+    /// Partners j > i of grain i.
+    pub fn partners(&self, i: usize) -> &[u32] {
+        &self.partner[self.first[i] as usize..self.first[i + 1] as usize]
     }
 
     /// Where a grain of the previous order stands now.
@@ -216,28 +200,26 @@ impl Neighbours {
         b.cell
             .extend(grains.place[..n].iter().map(|x| self.grid.index(x) as u32));
         b.cell_first.clear();
-        b.cell_first.resize(cells + 1, 0);
+        // Counted two places on: filling moves each cell's start to its end, one place on.
+        b.cell_first.resize(cells + 2, 0);
         for &c in &b.cell {
-            b.cell_first[c as usize + 1] += 1;
+            b.cell_first[c as usize + 2] += 1;
         }
-        for c in 0..cells {
-            b.cell_first[c + 1] += b.cell_first[c];
+        for c in 2..cells + 2 {
+            b.cell_first[c] += b.cell_first[c - 1];
         }
         b.order.clear();
         b.order.resize(n, 0);
         b.new_index.clear();
         b.new_index.resize(n, 0);
-        let mut next = std::mem::take(&mut b.carried_first);
-        next.clear();
-        next.extend_from_slice(&b.cell_first[..cells]);
         for (old, &c) in b.cell.iter().enumerate() {
-            let new = next[c as usize];
-            next[c as usize] += 1;
+            let new = b.cell_first[c as usize + 1];
+            b.cell_first[c as usize + 1] += 1;
             b.order[new as usize] = old as u32;
             b.new_index[old] = new;
         }
-        b.carried_first = next;
-        grains.reorder(&b.order, &mut b.sorted);
+        b.cell_first.truncate(cells + 1);
+        grains.reorder(&b.order);
     }
 
     fn lay_rows(&mut self, grains: &Grains) {
@@ -314,76 +296,6 @@ impl Neighbours {
             self.partner.extend_from_slice(&part.partner);
         }
         self.build.parts = parts;
-    }
-
-    /// Remembers the touching contacts of the old list.
-    fn collect_touching(&mut self, n: usize, width: usize) {
-        let b = &mut self.build;
-        b.carried.clear();
-        std::mem::swap(&mut b.old_history, &mut self.history);
-        if width == 0 || self.first.len() != n + 1 {
-            return;
-        }
-        for i in 0..n {
-            for k in self.first[i]..self.first[i + 1] {
-                let at = k as usize * width;
-                if b.old_history[at..at + width].iter().any(|&h| h != 0.0) {
-                    b.carried.push(Carried {
-                        i: i as u32,
-                        j: self.partner[k as usize],
-                        source: k,
-                        swapped: false,
-                    });
-                }
-            }
-        }
-    }
-
-    fn carry_history(&mut self, n: usize, width: usize) {
-        self.history.clear();
-        self.history.resize(self.partner.len() * width, 0.0);
-        let b = &mut self.build;
-        b.carried_first.clear();
-        b.carried_first.resize(n + 1, 0);
-        for c in &mut b.carried {
-            let (i, j) = (b.new_index[c.i as usize], b.new_index[c.j as usize]);
-            c.swapped = i > j;
-            (c.i, c.j) = (i.min(j), i.max(j));
-            b.carried_first[c.i as usize + 1] += 1;
-        }
-        for i in 0..n {
-            b.carried_first[i + 1] += b.carried_first[i];
-        }
-        b.carried_sorted.clear();
-        b.carried_sorted.resize(b.carried.len(), Carried::default());
-        // Fill from the back of each bucket, which leaves `carried_first` at the bucket's start.
-        for c in b.carried.iter().rev() {
-            let at = &mut b.carried_first[c.i as usize + 1];
-            *at -= 1;
-            b.carried_sorted[*at as usize] = *c;
-        }
-        for i in 0..n {
-            let (from, to) = (
-                b.carried_first[i + 1] as usize,
-                b.carried_first
-                    .get(i + 2)
-                    .map_or(b.carried_sorted.len(), |&f| f as usize),
-            );
-            for c in &b.carried_sorted[from..to] {
-                for k in self.first[i] as usize..self.first[i + 1] as usize {
-                    if self.partner[k] != c.j {
-                        continue;
-                    }
-                    let old = &b.old_history[c.source as usize * width..][..width];
-                    let new = &mut self.history[k * width..][..width];
-                    new.copy_from_slice(old);
-                    if c.swapped {
-                        // Vectors of i against j turn round; the twist about the normal does not.
-                        new.iter_mut().take(6).for_each(|h| *h = -*h);
-                    }
-                }
-            }
-        }
     }
 }
 

@@ -2,34 +2,22 @@
 
 use crate::energy::Energy;
 use crate::grains::{SPHERE_INERTIA, vector};
-use crate::motion::{self, Pull};
+use crate::motion;
 use crate::simulation::Simulation;
 use crate::snapshot::{ContactSample, GrainSample, Partner, Snapshot};
 use crate::state_hash::StateHash;
 use nalgebra::Vector3;
 
 impl Simulation {
-    /// What the motion pass would read now.
-    pub(crate) fn pull(&self) -> Pull<'_> {
-        let g = self.gravity;
-        Pull {
-            reach: &self.reach,
-            planes: &self.plane_contacts,
-            slot_rows: self.slot_rows(),
-            gravity: [g.x, g.y, g.z, 0.0],
-            kick: 0.0,
-            drift: 0.0,
-        }
-    }
-
     /// Velocity and angular velocity of a grain at the time of its position.
-    pub(crate) fn synchronised(&self, pull: &Pull, i: usize) -> (Vector3<f64>, Vector3<f64>) {
+    pub(crate) fn synchronised(&self, i: usize) -> (Vector3<f64>, Vector3<f64>) {
         let (v, s) = (&self.grains.motion[i], &self.grains.turn[i]);
         let (inverse_mass, inverse_radius) = (v[3], s[3]);
         let mut velocity = vector(v);
         let mut turn = vector(s);
         if self.steps_since_start > 0 && inverse_mass > 0.0 {
-            let [force, torque, moment] = motion::gather(pull, i);
+            let [force, torque, moment] =
+                motion::gather(&self.reach, &self.plane_contacts, self.slot_rows(), i);
             let half = 0.5 * self.timestep;
             velocity += half * (vector(&force) * inverse_mass + self.gravity);
             turn += half / SPHERE_INERTIA
@@ -39,8 +27,8 @@ impl Simulation {
         (velocity, turn * inverse_radius)
     }
 
-    pub(crate) fn grain_sample(&self, pull: &Pull, i: usize) -> GrainSample {
-        let (velocity, spin) = self.synchronised(pull, i);
+    pub(crate) fn grain_sample(&self, i: usize) -> GrainSample {
+        let (velocity, spin) = self.synchronised(i);
         GrainSample {
             id: self.grains.id[i],
             position: self.domain.wrap(vector(&self.grains.place[i])),
@@ -55,9 +43,8 @@ impl Simulation {
     /// All grains at this instant, in the order of their rows.
     pub(crate) fn samples(&mut self) -> Vec<GrainSample> {
         self.observe();
-        let pull = self.pull();
         (0..self.grains.len())
-            .map(|i| self.grain_sample(&pull, i))
+            .map(|i| self.grain_sample(i))
             .collect()
     }
 
@@ -67,14 +54,13 @@ impl Simulation {
         into.time = self.time();
         into.domain = self.domain;
         into.gravity = self.gravity;
-        let pull = self.pull();
         into.grains.clear();
         into.grains
-            .extend((0..self.grains.len()).map(|i| self.grain_sample(&pull, i)));
+            .extend((0..self.grains.len()).map(|i| self.grain_sample(i)));
         into.contacts.clear();
-        let rows = pull.slot_rows;
-        for k in 0..self.reach.count {
-            let (i, j) = (self.reach.i[k] as usize, self.reach.j[k] as usize);
+        let rows = self.slot_rows();
+        for (chunk, k) in self.reach.pairs() {
+            let (i, j) = (chunk.i[k] as usize, chunk.j[k] as usize);
             let (a, b) = (&self.grains.place[i], &self.grains.place[j]);
             let apart = self.domain.nearest_image(vector(a) - vector(b));
             let (distance, radii) = (apart.norm(), a[3] + b[3]);
@@ -86,7 +72,7 @@ impl Simulation {
                 grain: i,
                 partner: Partner::Grain(j),
                 overlap: radii - distance,
-                force: vector(&self.reach.slots[k * rows]),
+                force: vector(&chunk.slots[k * rows]),
                 arm: -apart * (a[3] / radii),
                 partner_arm: apart * (b[3] / radii),
             });
@@ -113,20 +99,19 @@ impl Simulation {
     /// Kinetic and elastic energy at this instant.
     pub fn energy(&mut self) -> Energy {
         self.observe();
-        let pull = self.pull();
         let mut energy = Energy::default();
         for i in (0..self.grains.len()).filter(|&i| !self.grains.is_fixed(i)) {
-            let (v, w) = self.synchronised(&pull, i);
+            let (v, w) = self.synchronised(i);
             let (m, r) = (self.grains.mass[i], self.grains.place[i][3]);
             energy.translation += 0.5 * m * v.norm_squared();
             energy.rotation += 0.5 * SPHERE_INERTIA * m * r * r * w.norm_squared();
         }
         let width = self.law.history();
-        for k in 0..self.reach.count {
-            let (i, j) = (self.reach.i[k] as usize, self.reach.j[k] as usize);
+        for (chunk, k) in self.reach.pairs() {
+            let (i, j) = (chunk.i[k] as usize, chunk.j[k] as usize);
             let (a, b) = (&self.grains.place[i], &self.grains.place[j]);
             let apart = self.domain.nearest_image(vector(a) - vector(b)).norm();
-            let history: Vec<f64> = self.reach.history[k / 4 * width..][..width]
+            let history: Vec<f64> = chunk.history[k / 4 * width..][..width]
                 .iter()
                 .map(|row| row[k % 4])
                 .collect();
@@ -249,15 +234,17 @@ impl Simulation {
             }
         }
         let width = self.law.history();
-        let mut contacts: Vec<(u32, u32, usize)> = (0..self.reach.count)
-            .map(|k| {
-                let (i, j) = (self.reach.i[k] as usize, self.reach.j[k] as usize);
-                (self.grains.id[i], self.grains.id[j], k)
+        let mut contacts: Vec<_> = self
+            .reach
+            .pairs()
+            .map(|(chunk, k)| {
+                let (i, j) = (chunk.i[k] as usize, chunk.j[k] as usize);
+                (self.grains.id[i], self.grains.id[j], chunk, k)
             })
             .collect();
-        contacts.sort_by_key(|&(a, b, _)| (a.min(b), a.max(b)));
-        for (a, b, k) in contacts {
-            let block = &self.reach.history[k / 4 * width..][..width];
+        contacts.sort_by_key(|&(a, b, ..)| (a.min(b), a.max(b)));
+        for (a, b, chunk, k) in contacts {
+            let block = &chunk.history[k / 4 * width..][..width];
             // Pairs within reach that do not touch are an accident of the lists.
             if block.iter().all(|row| row[k % 4] == 0.0) {
                 continue;

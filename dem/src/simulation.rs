@@ -1,15 +1,17 @@
 //! The simulation: one state, one step.
 
 use crate::contact::{ContactLaw, HISTORY_ROLLING, Interaction, Rolling, Sliding, Step};
+use crate::contacts::Touching;
 use crate::domain::{Domain, Images};
 use crate::forces::{self, Field};
 use crate::grains::Grains;
-use crate::motion::{self, Pull, RowResult};
+use crate::motion::Motion;
 use crate::neighbours::Neighbours;
 use crate::planes::{Plane, PlaneContacts};
-use crate::reach::Reach;
+use crate::reach::{Making, Reach};
 use crate::setup::{Setup, SetupError, Threads};
 use crate::snapshot::GrainSample;
+use crate::sweep::{self, Moved, Pass, Sweep};
 use nalgebra::Vector3;
 
 /// The step no longer follows the motion.
@@ -67,6 +69,9 @@ const RUN_THROUGH: f64 = 1.0;
 const SKIN: f64 = 0.3;
 const REACH: f64 = 0.04;
 
+/// Numbers of a contact's history that change sign when its two grains change order.
+const FLIPS: usize = 6;
+
 /// The law of the scene, ready for the inner loop.
 #[derive(Clone, Copy, Debug)]
 enum Kernel {
@@ -90,10 +95,9 @@ impl Kernel {
     }
 }
 
-/// Histories of all batches and plane contacts.
+/// Histories of all plane contacts.
 #[derive(Clone, Debug, Default)]
 struct Springs {
-    pairs: Vec<[f64; 4]>,
     planes: Vec<[f64; HISTORY_ROLLING]>,
     springs_current: bool,
 }
@@ -115,7 +119,13 @@ pub struct Simulation {
     pub(crate) list: Neighbours,
     pub(crate) reach: Reach,
     pub(crate) plane_contacts: PlaneContacts,
-    row_results: Vec<RowResult>,
+    /// Histories on their way to new lists.
+    touching: Touching,
+    /// For each row, the square of the largest speed against its drift (m²/s²).
+    fastest: Vec<f64>,
+    /// Fixed grains in order, and the momentum each has taken since it was last counted (N s).
+    fixed: Vec<u32>,
+    taken: Vec<[f64; 4]>,
     /// Momentum taken by fixed grains and planes since the start (N s).
     pub(crate) impulse: [f64; 3],
     /// Momentum that grains and walls together must hold by now: that of the start plus what gravity
@@ -167,7 +177,10 @@ impl Simulation {
             list: Neighbours::default(),
             reach: Reach::default(),
             plane_contacts: PlaneContacts::default(),
-            row_results: Vec::new(),
+            touching: Touching::default(),
+            fastest: Vec::new(),
+            fixed: Vec::new(),
+            taken: Vec::new(),
             impulse: [0.0; 3],
             account: Vector3::zeros(),
             weighed: 0.0,
@@ -198,10 +211,17 @@ impl Simulation {
     }
 
     fn step(&mut self) -> Result<(), Diverged> {
-        self.evaluate_forces();
         let started = self.steps_since_start > 0;
         let kick = if started { 1.0 } else { 0.5 } * self.timestep;
-        self.move_grains(kick);
+        self.pass(
+            if self.current {
+                Pass::Motion
+            } else {
+                Pass::Step
+            },
+            kick,
+        );
+        self.keep_accounts(kick);
         self.steps += 1;
         self.steps_since_start += 1;
         self.current = false;
@@ -215,7 +235,7 @@ impl Simulation {
         if self.current {
             return;
         }
-        self.before.pairs.clone_from(&self.reach.history);
+        self.reach.remember();
         self.before.planes.clear();
         let walls = self.plane_contacts.contacts.iter();
         self.before.planes.extend(walls.map(|c| c.history));
@@ -228,7 +248,7 @@ impl Simulation {
         if !self.current {
             return;
         }
-        std::mem::swap(&mut self.reach.history, &mut self.before.pairs);
+        self.reach.recall();
         let walls = self.plane_contacts.contacts.iter_mut();
         for (contact, history) in walls.zip(&self.before.planes) {
             contact.history = *history;
@@ -237,57 +257,75 @@ impl Simulation {
         self.current = false;
     }
 
-    /// Forces of the present positions into the slots; springs stretch by the step just made.
+    /// Forces of the present positions into the slots of all pairs.
     fn evaluate_forces(&mut self) {
-        if self.current {
-            return;
+        if !self.current {
+            self.pass(Pass::Forces, 0.0);
+            self.current = true;
         }
+    }
+
+    fn pass(&mut self, pass: Pass, kick: f64) {
+        let deepest = match self.kernel {
+            Kernel::Sliding(law) => self.pass_law(&law, pass, kick),
+            Kernel::Rolling(law) => self.pass_law(&law, pass, kick),
+        };
+        self.deepest = self.deepest.max(deepest);
+    }
+
+    /// Sweeps over all grains; springs stretch by the step just made.
+    fn pass_law<I: Interaction>(&mut self, law: &I, pass: Pass, kick: f64) -> f64 {
         let stretch = self.steps_since_start > 0 && !self.springs_current;
         let step = Step {
             stretch: if stretch { self.timestep } else { 0.0 },
         };
         self.springs_current = true;
-        let deepest = match self.kernel {
-            Kernel::Sliding(law) => self.evaluate_law(&law, step),
-            Kernel::Rolling(law) => self.evaluate_law(&law, step),
-        };
-        self.deepest = self.deepest.max(deepest);
-        self.current = true;
-    }
-
-    fn evaluate_law<I: Interaction>(&mut self, law: &I, step: Step) -> f64 {
-        let field = Field {
-            place: &self.grains.place,
-            motion: &self.grains.motion,
-            turn: &self.grains.turn,
-            images: Images::of(&self.domain),
-            lever: self.law.lever,
-            step,
-        };
-        let pairs = forces::evaluate(law, &self.grains, &field, &mut self.reach, self.parallel);
-        let walls =
+        let lever = self.law.lever;
+        let walls = if pass == Pass::Motion {
+            0.0
+        } else {
+            let planes = &self.planes;
             self.plane_contacts
-                .evaluate(law, &self.planes, &self.grains, self.law.lever, step);
+                .evaluate(law, planes, &self.grains, lever, step)
+        };
+        let (g, n) = (self.gravity, self.grains.len());
+        let grains = &mut self.grains;
+        let sweep = Sweep {
+            pass,
+            field: Field {
+                place: &grains.place,
+                motion: &grains.motion,
+                turn: &grains.turn,
+                images: Images::of(&self.domain),
+                lever,
+                step,
+            },
+            planes: &self.plane_contacts,
+            rows: &self.list.rows,
+            motion: Motion {
+                gravity: [g.x, g.y, g.z, 0.0],
+                kick,
+                drift: self.timestep,
+            },
+            fixed: &self.fixed,
+        };
+        let moved = Moved {
+            first: [0; 3],
+            place: &mut grains.next.place[..n],
+            motion: &mut grains.next.motion[..n],
+            turn: &mut grains.next.turn[..n],
+            fastest: &mut self.fastest,
+            taken: &mut self.taken,
+        };
+        let pairs = sweep::run(law, &sweep, &mut self.reach.chunks, moved);
+        if pass != Pass::Forces {
+            grains.turn_over();
+        }
         pairs.max(walls)
     }
 
-    fn move_grains(&mut self, kick: f64) {
-        let g = self.gravity;
-        let pull = Pull {
-            reach: &self.reach,
-            planes: &self.plane_contacts,
-            slot_rows: self.slot_rows(),
-            gravity: [g.x, g.y, g.z, 0.0],
-            kick,
-            drift: self.timestep,
-        };
-        motion::advance(
-            &mut self.grains,
-            &self.list.rows,
-            &pull,
-            &mut self.row_results,
-            self.parallel,
-        );
+    /// Books what a step has done to momentum and to the lists' lifetimes.
+    fn keep_accounts(&mut self, kick: f64) {
         for contact in &self.plane_contacts.contacts {
             for k in 0..3 {
                 self.impulse[k] -= kick * contact.slot[0][k];
@@ -296,8 +334,8 @@ impl Simulation {
         self.account += self.weighed * kick * self.gravity;
         self.list.age += self.timestep;
         self.reach.age += self.timestep;
-        for (r, row) in self.row_results.iter().enumerate() {
-            let travel = self.timestep * row.fluctuation;
+        for (r, fastest) in self.fastest.iter().enumerate() {
+            let travel = self.timestep * fastest.sqrt();
             self.list.travel[r] += travel;
             self.reach.travel[r] += travel;
         }
@@ -319,11 +357,9 @@ impl Simulation {
                     timestep: self.timestep,
                 });
             }
-            self.store_history();
             self.rebuild();
         } else if list.outdated_since(&self.reach.travel, self.reach.age, self.reach_skin) {
-            self.store_history();
-            self.renew_reach();
+            self.make_reach(false);
         }
         Ok(())
     }
@@ -350,58 +386,77 @@ impl Simulation {
         }
     }
 
-    /// Brings the histories of the batches back into the Verlet list.
-    pub(crate) fn store_history(&mut self) {
-        self.reach.store_history(&mut self.list, self.law.history());
-    }
-
     fn rebuild(&mut self) {
         self.fold_impulses();
-        let width = self.law.history();
         self.list.build(
             &mut self.grains,
             &self.domain,
             self.largest_radius,
             self.skin,
-            width,
             self.parallel,
         );
-        let list = &self.list;
+        let (width, list, touching) = (self.law.history(), &self.list, &mut self.touching);
+        touching.clear(width);
+        self.reach.surrender(width, |i, j, history| {
+            let (i, j) = (list.new_index(i), list.new_index(j));
+            touching.push(i, j, history, FLIPS);
+        });
         self.plane_contacts
             .build(&self.planes, &self.grains, &list.rows, self.skin, |old| {
                 list.new_index(old)
             });
         self.renew_rows();
-        self.renew_reach();
+        self.make_reach(true);
         self.rebuilds += 1;
     }
 
-    /// Makes room for what the motion pass leaves for each row.
+    /// Makes room for what a step leaves for rows and fixed grains.
     pub(crate) fn renew_rows(&mut self) {
-        self.row_results.clear();
-        self.row_results
-            .resize(self.list.rows.len(), RowResult::default());
+        self.fastest.clear();
+        self.fastest.resize(self.list.rows.len(), 0.0);
+        self.fixed.clear();
+        let grains = &self.grains;
+        let fixed = (0..grains.len()).filter(|&i| grains.is_fixed(i));
+        self.fixed.extend(fixed.map(|i| i as u32));
+        self.taken.clear();
+        self.taken.resize(self.fixed.len(), [0.0; 4]);
     }
 
-    pub(crate) fn renew_reach(&mut self) {
-        self.reach.build(
-            &self.grains,
-            &self.list,
-            &Images::of(&self.domain),
-            self.reach_skin,
-            self.law.history(),
-            self.slot_rows(),
-        );
+    /// Makes the list of pairs within reach anew: in new chunks, with the histories in `touching`, or
+    /// in the same ones with the histories it has.
+    fn make_reach(&mut self, cut: bool) {
+        let making = Making {
+            grains: &self.grains,
+            list: &self.list,
+            images: Images::of(&self.domain),
+            skin: self.reach_skin,
+            width: self.law.history(),
+        };
+        if cut {
+            self.touching.order(self.grains.len());
+            self.reach.cut(&making, &self.touching, self.parallel);
+        } else {
+            self.reach.renew(&making);
+        }
         self.current = false;
     }
 
-    /// Adds the rows' impulses to the total, in row order.
+    /// Takes up histories of touching contacts i < j, as a checkpoint has them.
+    pub(crate) fn take_histories(&mut self, pairs: &[[u32; 2]], histories: &[f64]) {
+        let width = self.law.history();
+        self.touching.clear(width);
+        for (&[i, j], history) in pairs.iter().zip(histories.chunks_exact(width)) {
+            self.touching.push(i, j, history, FLIPS);
+        }
+        self.make_reach(true);
+    }
+
+    /// Adds what fixed grains have taken to the total, in their order.
     pub(crate) fn fold_impulses(&mut self) {
-        for row in &mut self.row_results {
-            for k in 0..3 {
-                self.impulse[k] += row.impulse[k];
+        for taken in &mut self.taken {
+            for (sum, taken) in self.impulse.iter_mut().zip(std::mem::take(taken)) {
+                *sum += taken;
             }
-            row.impulse = [0.0; 3];
         }
     }
 
@@ -437,7 +492,6 @@ impl Simulation {
         }
         if any {
             // The row's drift was the mean of other velocities: let the bound start afresh.
-            self.store_history();
             self.rebuild();
             self.open_account();
         }
@@ -446,7 +500,6 @@ impl Simulation {
     /// Velocities now belong to the time of the positions, not to half a step before.
     fn restart_motion(&mut self) {
         self.steps_since_start = 0;
-        self.store_history();
         self.rebuild();
         self.open_account();
     }
