@@ -83,6 +83,8 @@ pub(crate) struct Chunk {
     pub j: Vec<u32>,
     /// Pairs before padding.
     pub count: usize,
+    /// Pairs with a gap of more than half the skin.
+    outer: usize,
     /// Terms of the sum of grain `grains.start + g`: `terms[first_term[g]..first_term[g + 1]]`.
     pub first_term: Vec<u32>,
     pub terms: Vec<Term>,
@@ -112,9 +114,15 @@ pub(crate) struct Chunk {
 }
 
 /// All pairs within reach.
-#[derive(Clone, Debug, Default)]
+#[derive(Clone, Debug)]
 pub(crate) struct Reach {
     pub chunks: Vec<Chunk>,
+    /// Largest gap of a listed pair when the list is made (m).
+    pub skin: f64,
+    /// The diameter that the skin goes by (m).
+    diameter: f64,
+    /// Steps since the list was made.
+    pub steps: u32,
     /// Travel of each row since this list was made (m).
     pub travel: Vec<f64>,
     /// Time since then (s).
@@ -128,8 +136,6 @@ pub(crate) struct Making<'a> {
     pub grains: &'a Grains,
     pub list: &'a Neighbours,
     pub images: Images,
-    /// Largest gap of a listed pair (m).
-    pub skin: f64,
     /// Numbers of history of a contact.
     pub width: usize,
 }
@@ -143,7 +149,44 @@ const GRAINS_A_CHUNK: usize = 700;
 /// Chunks for each thread: more than one, so that a thread that is held up can be helped.
 const CHUNKS_A_THREAD: usize = 2;
 
+/// Skin at the start and its range, in smallest-grain diameters.
+const SKIN: f64 = 0.015;
+const SKINS: [f64; 2] = [0.003, 0.1];
+
+/// Cost of a pair of the Verlet list when the list is made, over that of a listed pair in a step.
+const COST_OF_MAKING: f64 = 1.0;
+
 impl Reach {
+    /// An empty list for grains with this smallest diameter.
+    pub fn new(diameter: f64) -> Self {
+        Reach {
+            chunks: Vec::new(),
+            skin: SKIN * diameter,
+            diameter,
+            steps: 0,
+            travel: Vec::new(),
+            age: 0.0,
+            incoming: Vec::new(),
+        }
+    }
+
+    /// Goes to the skin at which steps would have been cheapest, at most twice or half of the last.
+    ///
+    /// Near the present skin s the number of pairs grows as `a s`, and the list lasts about `b s`
+    /// steps: the cost of a step, `a s + c V/(b s)` with V pairs in the Verlet list, is least at
+    /// `s² = c V/(a b)`. Pairs do not grow in proportion to the skin, as many grains rattle at gaps
+    /// below any skin; so a comes from the pairs in the outer half of it. Counts only: the same for
+    /// any number of threads. (It would change no bits, if it were not.)
+    fn tune(&mut self, list: &Neighbours) {
+        let outer: usize = self.chunks.iter().map(|c| c.outer).sum();
+        let listing = 2.0 * outer.max(1) as f64 * f64::from(self.steps.max(1));
+        let better = self.skin * (COST_OF_MAKING * list.partner.len() as f64 / listing).sqrt();
+        let [least, most] = SKINS.map(|s| s * self.diameter);
+        self.skin = better
+            .clamp(0.5 * self.skin, 2.0 * self.skin)
+            .clamp(least, most);
+    }
+
     /// Cuts the rows into chunks of about equal work and deals out the histories.
     pub fn cut(&mut self, making: &Making, touching: &Touching, parallel: bool) {
         let (rows, first) = (&making.list.rows, &making.list.first);
@@ -173,7 +216,8 @@ impl Reach {
             (chunk.rows, chunk.grains) = (row..end, grain(row)..grain(end));
             row = end;
         }
-        let deal = |chunk: &mut Chunk| chunk.take_up(touching, making);
+        let skin = self.skin;
+        let deal = |chunk: &mut Chunk| chunk.take_up(touching, making, skin);
         if self.chunks.len() > 1 {
             self.chunks.par_iter_mut().for_each(deal);
         } else {
@@ -184,9 +228,11 @@ impl Reach {
 
     /// Makes the list anew in the same chunks.
     pub fn renew(&mut self, making: &Making) {
+        self.tune(making.list);
+        let skin = self.skin;
         let renew = |chunk: &mut Chunk| {
             chunk.compact(making.width, |_, _, _| ());
-            chunk.fill(making);
+            chunk.fill(making, skin);
         };
         if self.chunks.len() > 1 {
             self.chunks.par_iter_mut().for_each(renew);
@@ -231,6 +277,7 @@ impl Reach {
         self.travel.clear();
         self.travel.resize(making.list.rows.len(), 0.0);
         self.age = 0.0;
+        self.steps = 0;
     }
 
     /// Shows the histories of all touching contacts, ordered by i: `see(i, j, history)`.
@@ -326,7 +373,7 @@ impl Chunk {
 
     /// Takes over the histories of its pairs from a list of all of them, in the order of the Verlet
     /// list.
-    fn take_up(&mut self, touching: &Touching, making: &Making) {
+    fn take_up(&mut self, touching: &Touching, making: &Making, skin: f64) {
         let width = making.width;
         self.touched.clear();
         self.first_touched.clear();
@@ -344,22 +391,22 @@ impl Chunk {
             }
             self.first_touched.push(self.touched.len() as u32);
         }
-        self.fill(making);
+        self.fill(making, skin);
     }
 
     /// Lists the pairs; histories and partners stand as [`Chunk::compact`] leaves them.
-    fn fill(&mut self, making: &Making) {
+    fn fill(&mut self, making: &Making, skin: f64) {
         let Making {
             grains,
             list,
             images,
-            skin,
             width,
         } = *making;
         let (touched, first_touched) = (&self.touched, &self.first_touched);
         self.i.clear();
         self.j.clear();
         self.exported.clear();
+        self.outer = 0;
         let mut next = 0;
         for i in self.grains.clone() {
             let xi = &grains.place[i];
@@ -378,6 +425,8 @@ impl Chunk {
                     }
                     self.i.push(i as u32);
                     self.j.push(j);
+                    let half = near - 0.5 * skin;
+                    self.outer += usize::from(r2 > half * half);
                 }
             }
         }

@@ -63,11 +63,8 @@ pub enum Diverged {
 /// An overlap, over the harmonic mean radius, that no run of ours means: grains half way through.
 const RUN_THROUGH: f64 = 1.0;
 
-/// Skin of the Verlet list, and reach beyond touching of the batches, in smallest-grain diameters.
-///
-/// Chosen by measurement on the inclined flow; they change speed only.
+/// Skin of the Verlet list in smallest-grain diameters, chosen by measurement on the inclined flow.
 const SKIN: f64 = 0.3;
-const REACH: f64 = 0.04;
 
 /// Numbers of a contact's history that change sign when its two grains change order.
 const FLIPS: usize = 6;
@@ -113,7 +110,6 @@ pub struct Simulation {
     kernel: Kernel,
     parallel: bool,
     skin: f64,
-    reach_skin: f64,
     largest_radius: f64,
     pub(crate) grains: Grains,
     pub(crate) list: Neighbours,
@@ -171,11 +167,10 @@ impl Simulation {
             timestep: setup.timestep,
             parallel: setup.threads == Threads::Rayon,
             skin,
-            reach_skin: skin * REACH / SKIN,
             largest_radius,
             grains: Grains::new(&setup.grains),
             list: Neighbours::default(),
-            reach: Reach::default(),
+            reach: Reach::new(skin / SKIN),
             plane_contacts: PlaneContacts::default(),
             touching: Touching::default(),
             fastest: Vec::new(),
@@ -334,6 +329,7 @@ impl Simulation {
         self.account += self.weighed * kick * self.gravity;
         self.list.age += self.timestep;
         self.reach.age += self.timestep;
+        self.reach.steps += 1;
         for (r, fastest) in self.fastest.iter().enumerate() {
             let travel = self.timestep * fastest.sqrt();
             self.list.travel[r] += travel;
@@ -358,7 +354,7 @@ impl Simulation {
                 });
             }
             self.rebuild();
-        } else if list.outdated_since(&self.reach.travel, self.reach.age, self.reach_skin) {
+        } else if list.outdated_since(&self.reach.travel, self.reach.age, self.reach.skin) {
             self.make_reach(false);
         }
         Ok(())
@@ -429,7 +425,6 @@ impl Simulation {
             grains: &self.grains,
             list: &self.list,
             images: Images::of(&self.domain),
-            skin: self.reach_skin,
             width: self.law.history(),
         };
         if cut {
