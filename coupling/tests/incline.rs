@@ -7,7 +7,7 @@ use colluvium_coupling::incline::{
     InclineError, InclineResult, InclineRun, InclineSpec, Outcome, Purpose, Start,
 };
 use colluvium_dem::preparation::{Bed, InclineBed, RadiusLaw, settle_incline_bed};
-use colluvium_dem::{ContactLaw, Hooke, Lever, ShapeParameter, TangentialSpring, Threads};
+use colluvium_dem::{ContactLaw, Hooke, ShapeParameter, TangentialSpring, Threads};
 use std::ops::ControlFlow;
 use std::sync::Mutex;
 use std::sync::OnceLock;
@@ -18,23 +18,15 @@ const STEP: f64 = 6e-4;
 
 /// Moderate friction of the thesis in units d = g = 1.
 fn law() -> ContactLaw {
-    ContactLaw {
-        normal: Hooke {
-            stiffness: 2e4,
-            restitution: 0.5,
-        },
-        tangential: TangentialSpring {
-            stiffness_ratio: 2.0 / 7.0,
-            restitution: 0.5,
-            friction: 1.0,
-        },
-        rolling: Some(ShapeParameter {
+    ContactLaw::linear(
+        Hooke::matched(2e4, 0.5),
+        TangentialSpring::matched(2.0 / 7.0, 0.5, 1.0),
+        Some(ShapeParameter {
             beta: 0.2,
             rolling_friction: 1.05,
             twisting_friction: 1.3,
         }),
-        lever: Lever::ContactPoint,
-    }
+    )
 }
 
 fn settle(grains: usize, length: f64, width: f64) -> Bed {

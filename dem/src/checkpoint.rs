@@ -4,7 +4,7 @@
 //! built again. The shorter list of pairs within reach is not: it changes no bits. Only contacts that
 //! touch have a history.
 
-use crate::contact::HISTORY_ROLLING;
+use crate::contact::HISTORY_MAX;
 use crate::grains::{Grains, Next};
 use crate::neighbours::Row;
 use crate::planes::PlaneContact;
@@ -46,7 +46,7 @@ impl Simulation {
         numbers("grains/turn", flatten(&self.grains.turn[..n]));
         numbers("grains/mass", self.grains.mass.clone());
         let (mut pairs, mut springs) = (Vec::new(), Vec::new());
-        self.reach.touching(self.law.history(), |i, j, history| {
+        self.reach.touching(self.layout.history, |i, j, history| {
             pairs.extend([u64::from(i), u64::from(j)]);
             springs.extend_from_slice(history);
         });
@@ -67,6 +67,8 @@ impl Simulation {
             record.counts.insert(name.into(), values);
         };
         counts("grains/id", wide(&self.grains.id));
+        let material = self.grains.material[..n].iter().map(|&m| u64::from(m));
+        counts("grains/material", material.collect());
         counts("contacts/pair", pairs);
         counts("list/first", wide(&self.list.first));
         counts("list/partner", wide(&self.list.partner));
@@ -116,8 +118,17 @@ impl Simulation {
             turn: rows(sized("grains/turn", 4 * n)?),
             mass: sized("grains/mass", n)?.to_vec(),
             id: narrow("grains/id", record.counts("grains/id")?)?,
+            material: record
+                .counts("grains/material")?
+                .iter()
+                .map(|&m| m as u16)
+                .collect(),
             next: Next::default(),
         };
+        let known = |&m: &u16| usize::from(m) < self.law.materials();
+        if grains.material.len() != n || !grains.material.iter().all(known) {
+            return Err("array `grains/material` names unknown materials".into());
+        }
         if grains.id.len() != n || grains.id.iter().any(|&id| id as usize >= n) {
             return Err("array `grains/id` does not number the grains of this scene".into());
         }
@@ -150,7 +161,7 @@ impl Simulation {
         if !touching.iter().all(listed) {
             return Err("array `contacts/pair` has a pair that is not in `list/partner`".into());
         }
-        let springs = sized("contacts/history", self.law.history() * touching.len())?;
+        let springs = sized("contacts/history", self.layout.history * touching.len())?;
         let ends = narrow("list/row_end", record.counts("list/row_end")?)?;
         let drifts: Vec<[f64; 3]> = rows(sized("list/row_drift", 3 * ends.len())?);
         let cells: Vec<usize> = record
@@ -186,8 +197,8 @@ impl Simulation {
         self.weigh();
 
         let of = narrow("planes/contact", record.counts("planes/contact")?)?;
-        let histories: Vec<[f64; HISTORY_ROLLING]> =
-            rows(sized("planes/history", of.len() / 2 * HISTORY_ROLLING)?);
+        let histories: Vec<[f64; HISTORY_MAX]> =
+            rows(sized("planes/history", of.len() / 2 * HISTORY_MAX)?);
         let contacts: Vec<PlaneContact> = of
             .as_chunks::<2>()
             .0

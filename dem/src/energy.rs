@@ -9,8 +9,11 @@ pub struct Energy {
     pub translation: f64,
     /// Σ I ω²/2.
     pub rotation: f64,
-    /// Normal springs, Σ k_n x²/2.
+    /// Normal parts of contacts, with the energy of adhesive ones.
     pub normal: f64,
+    /// Attraction of cohesive contacts, -Σ F_c x.
+    #[serde(default)]
+    pub cohesion: f64,
     /// Tangential springs, Σ k_t S²/2.
     pub tangential: f64,
     /// Rolling springs, Σ k_R δ_R²/2.
@@ -25,9 +28,9 @@ impl Energy {
         self.translation + self.rotation
     }
 
-    /// Energy of all springs (J).
+    /// Energy of all contacts (J).
     pub fn elastic(&self) -> f64 {
-        self.normal + self.tangential + self.rolling + self.twisting
+        self.normal + self.cohesion + self.tangential + self.rolling + self.twisting
     }
 
     /// Kinetic and elastic energy (J).

@@ -2,7 +2,7 @@
 //!
 //! Reads positions and velocities, writes each pair's slot and history, touches nothing else.
 
-use crate::contact::{HISTORY_ROLLING, Interaction, Lever, Step, Touch, Wrench};
+use crate::contact::{COEFFICIENTS, HISTORY_MAX, Interaction, Lever, Step, Touch, Wrench};
 use crate::domain::Images;
 use crate::lanes::{Lanes4, Vec3};
 
@@ -12,8 +12,11 @@ pub(crate) struct Field<'a> {
     pub place: &'a [[f64; 4]],
     pub motion: &'a [[f64; 4]],
     pub turn: &'a [[f64; 4]],
+    pub material: &'a [u16],
     pub images: Images,
     pub lever: Lever,
+    /// Largest gap that any established contact holds across (m).
+    pub hold: f64,
     pub step: Step,
 }
 
@@ -22,10 +25,48 @@ pub(crate) const fn slot_rows<I: Interaction>() -> usize {
     if I::ROLLING { 3 } else { 2 }
 }
 
-/// Evaluates the law on four pairs.
+/// Coefficients of the first material, in all lanes.
 #[inline(always)]
-pub(crate) fn batch<L: Lanes4, I: Interaction>(
+pub(crate) fn like_coefficients<L: Lanes4, I: Interaction>(law: &I) -> [L; COEFFICIENTS] {
+    let mut lanes = [L::splat(0.0); COEFFICIENTS];
+    for (lane, &number) in lanes.iter_mut().zip(&law.table()[0]) {
+        *lane = L::splat(number);
+    }
+    lanes
+}
+
+/// Coefficients of four pairs.
+#[inline(always)]
+fn mixed_coefficients<L: Lanes4, I: Interaction>(
     law: &I,
+    material: &[u16],
+    i: &[u32],
+    j: &[u32],
+) -> [L; COEFFICIENTS] {
+    let (table, n) = (law.table(), law.materials());
+    let mut lanes = [L::splat(0.0); COEFFICIENTS];
+    let mut pair = [0; 4];
+    for (pair, (&i, &j)) in pair.iter_mut().zip(i.iter().zip(j)) {
+        *pair = usize::from(material[i as usize]) * n + usize::from(material[j as usize]);
+    }
+    for block in 0..COEFFICIENTS / 4 {
+        let mut rows = [L::splat(0.0); 4];
+        for (row, &pair) in rows.iter_mut().zip(&pair) {
+            let numbers = &table[pair].as_chunks::<4>().0[block];
+            *row = L::load(numbers);
+        }
+        let columns = L::transpose(rows);
+        lanes[4 * block..4 * block + 4].copy_from_slice(&columns);
+    }
+    lanes
+}
+
+/// Evaluates the law on four pairs.
+#[allow(clippy::too_many_arguments)]
+#[inline(always)]
+pub(crate) fn batch<L: Lanes4, I: Interaction, const MIXED: bool>(
+    law: &I,
+    like: &[L; COEFFICIENTS],
     field: &Field,
     i: &[u32],
     j: &[u32],
@@ -45,7 +86,12 @@ pub(crate) fn batch<L: Lanes4, I: Interaction>(
     }
     let d = Vec3(d);
     let r2 = d.dot(d);
-    let touching = r2.less(reach * reach);
+    let far = if I::HOLDS {
+        reach + L::splat(field.hold)
+    } else {
+        reach
+    };
+    let mut touching = r2.less(far * far);
     if !L::any(touching) {
         // Lists are short-lived: writing zeros costs less than remembering which are zero.
         history.fill([0.0; 4]);
@@ -54,6 +100,23 @@ pub(crate) fn batch<L: Lanes4, I: Interaction>(
     }
     let [vx, vy, vz, inverse_mass] = combine(field.motion, i, j, minus);
     let [sx, sy, sz, curvature] = combine(field.turn, i, j, one);
+    let mixed;
+    let coefficients = if MIXED {
+        mixed = mixed_coefficients::<L, I>(law, field.material, i, j);
+        &mixed
+    } else {
+        like
+    };
+    let mut springs = [zero; HISTORY_MAX];
+    for (spring, row) in springs.iter_mut().zip(history.iter()) {
+        *spring = L::load(row);
+    }
+    if I::HOLDS {
+        // The last number of history is 1 on an established contact, which holds across a gap.
+        let held = law.hold(coefficients, curvature) * springs[I::HISTORY - 1];
+        let far = reach + L::select(zero.less(held), held, zero);
+        touching = r2.less(far * far);
+    }
     let distance = r2.sqrt();
     let normal = d.scale(one / distance);
     let overlap = reach - distance;
@@ -75,6 +138,16 @@ pub(crate) fn batch<L: Lanes4, I: Interaction>(
     } else {
         Vec3::zero()
     };
+    let inverse_inertia = if I::INERTIA {
+        L::load(&[
+            inverse_inertia_sum(field, i[0], j[0]),
+            inverse_inertia_sum(field, i[1], j[1]),
+            inverse_inertia_sum(field, i[2], j[2]),
+            inverse_inertia_sum(field, i[3], j[3]),
+        ])
+    } else {
+        zero
+    };
     let touch = Touch {
         normal,
         overlap,
@@ -82,16 +155,13 @@ pub(crate) fn batch<L: Lanes4, I: Interaction>(
         spin,
         inverse_mass,
         curvature,
+        inverse_inertia,
     };
-    let mut springs = [zero; HISTORY_ROLLING];
-    for (spring, row) in springs.iter_mut().zip(history.iter()) {
-        *spring = L::load(row);
-    }
     let Wrench {
         force,
         tangential,
         moment,
-    } = law.wrench(&touch, &mut springs, field.step);
+    } = law.wrench(coefficients, &touch, &mut springs, field.step);
     for (spring, row) in springs.iter().zip(history.iter_mut()) {
         L::select(touching, *spring, zero).store(row);
     }
@@ -103,6 +173,14 @@ pub(crate) fn batch<L: Lanes4, I: Interaction>(
     }
     let depth = L::select(touching, overlap * curvature * L::splat(0.5), zero);
     *deepest = deepest.max(depth);
+}
+
+/// `1/(m_i R_i²) + 1/(m_j R_j²)`.
+#[inline(always)]
+fn inverse_inertia_sum(field: &Field, i: u32, j: u32) -> f64 {
+    let (i, j) = (i as usize, j as usize);
+    let (a, b) = (field.turn[i][3], field.turn[j][3]);
+    field.motion[i][3] * a * a + field.motion[j][3] * b * b
 }
 
 // No closures in here: they would be compiled without AVX2, and every operation in them would

@@ -17,6 +17,8 @@ pub struct Grain {
     pub density: f64,
     /// Keeps its velocity whatever touches it: part of a rough base.
     pub fixed: bool,
+    /// Number of its material in the law table.
+    pub material: u16,
 }
 
 impl Grain {
@@ -29,6 +31,7 @@ impl Grain {
             radius,
             density,
             fixed: false,
+            material: 0,
         }
     }
 
@@ -57,6 +60,8 @@ pub(crate) struct Grains {
     pub mass: Vec<f64>,
     /// Number given at the start.
     pub id: Vec<u32>,
+    /// Number of the material.
+    pub material: Vec<u16>,
     /// Rows in the making.
     pub next: Next,
 }
@@ -70,6 +75,7 @@ pub(crate) struct Next {
     pub turn: Vec<[f64; 4]>,
     mass: Vec<f64>,
     id: Vec<u32>,
+    material: Vec<u16>,
 }
 
 impl Grains {
@@ -83,6 +89,7 @@ impl Grains {
             state.turn.push([s.x, s.y, s.z, 1.0 / g.radius]);
             state.mass.push(g.mass());
             state.id.push(id as u32);
+            state.material.push(g.material);
         }
         state.pad();
         state
@@ -93,6 +100,7 @@ impl Grains {
         self.place.push([0.0; 4]);
         self.motion.push([0.0; 4]);
         self.turn.push([0.0; 4]);
+        self.material.push(0);
         let rows = self.place.len();
         for next in [
             &mut self.next.place,
@@ -134,6 +142,11 @@ impl Grains {
             .id
             .extend(order.iter().map(|&o| self.id[o as usize]));
         std::mem::swap(&mut self.id, &mut self.next.id);
+        self.next.material.clear();
+        let materials = order.iter().map(|&o| self.material[o as usize]);
+        self.next.material.extend(materials);
+        self.next.material.push(0);
+        std::mem::swap(&mut self.material, &mut self.next.material);
     }
 
     /// Makes the rows that a step has written the present ones.

@@ -21,6 +21,8 @@ pub trait Lane:
     fn splat(value: f64) -> Self;
     /// Square root.
     fn sqrt(self) -> Self;
+    /// Cube root.
+    fn cbrt(self) -> Self;
     /// Absolute value.
     fn abs(self) -> Self;
     /// Smaller of the two; `other` where either is not a number.
@@ -135,6 +137,10 @@ impl Lane for f64 {
         f64::sqrt(self)
     }
     #[inline(always)]
+    fn cbrt(self) -> Self {
+        f64::cbrt(self)
+    }
+    #[inline(always)]
     fn abs(self) -> Self {
         f64::abs(self)
     }
@@ -212,6 +218,10 @@ impl Lane for Portable {
     #[inline(always)]
     fn sqrt(self) -> Self {
         self.map(f64::sqrt)
+    }
+    #[inline(always)]
+    fn cbrt(self) -> Self {
+        self.map(f64::cbrt)
     }
     #[inline(always)]
     fn abs(self) -> Self {
@@ -316,6 +326,13 @@ pub mod avx2 {
         fn sqrt(self) -> Self {
             // SAFETY: the module's invariant: AVX2 is present.
             Avx2(unsafe { _mm256_sqrt_pd(self.0) })
+        }
+        #[inline(always)]
+        fn cbrt(self) -> Self {
+            // There is no instruction for it: four calls.
+            let mut row = [0.0; 4];
+            self.store(&mut row);
+            Self::load(&[row[0].cbrt(), row[1].cbrt(), row[2].cbrt(), row[3].cbrt()])
         }
         #[inline(always)]
         fn abs(self) -> Self {

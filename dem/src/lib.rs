@@ -30,7 +30,11 @@ mod state_hash;
 mod sweep;
 pub mod timestep;
 
-pub use contact::{ContactLaw, Hooke, Lever, ShapeParameter, TangentialSpring};
+pub use contact::{
+    Cohesion, ContactLaw, Damping, Elasticity, Epsd, Hertz, Hooke, Jkr, LawTable, Laws, Lever,
+    Mindlin, Normal, Rolling, ShapeParameter, SpringStiffness, Tangential, TangentialSpring,
+    Viscoelastic,
+};
 pub use domain::Domain;
 pub use energy::Energy;
 pub use grains::Grain;

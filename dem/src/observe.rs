@@ -1,12 +1,31 @@
 //! Looking at a simulation: snapshots, energies, sums, hash.
 
+use crate::contact::composition::Visitor;
+use crate::contact::{HISTORY_MAX, Interaction, Stored};
 use crate::energy::Energy;
 use crate::grains::{SPHERE_INERTIA, vector};
 use crate::motion;
+use crate::reach::Chunk;
 use crate::simulation::Simulation;
 use crate::snapshot::{ContactSample, GrainSample, Partner, Snapshot};
 use crate::state_hash::StateHash;
 use nalgebra::Vector3;
+
+/// Energy stored by one contact.
+struct Store<'a> {
+    pair: usize,
+    overlap: f64,
+    curvature: f64,
+    history: &'a [f64],
+}
+
+impl Visitor for Store<'_> {
+    type Output = Stored;
+    fn visit<I: Interaction>(self, law: &I) -> Stored {
+        let coefficients = &law.table()[self.pair];
+        law.stored(coefficients, self.overlap, self.curvature, self.history)
+    }
+}
 
 impl Simulation {
     /// Velocity and angular velocity of a grain at the time of its position.
@@ -64,7 +83,7 @@ impl Simulation {
             let (a, b) = (&self.grains.place[i], &self.grains.place[j]);
             let apart = self.domain.nearest_image(vector(a) - vector(b));
             let (distance, radii) = (apart.norm(), a[3] + b[3]);
-            if distance >= radii {
+            if distance >= radii && !self.holds(&self.history_of(chunk, k)) {
                 continue;
             }
             // The contact point divides the line of centres as the radii do.
@@ -82,7 +101,8 @@ impl Simulation {
             let plane = &self.planes[contact.plane as usize];
             let x = &self.grains.place[i];
             let distance = plane.distance(&vector(x));
-            if distance >= x[3] || self.grains.is_fixed(i) {
+            let held = self.holds(&contact.history[..self.layout.history]);
+            if (distance >= x[3] && !held) || self.grains.is_fixed(i) {
                 continue;
             }
             into.contacts.push(ContactSample {
@@ -106,47 +126,86 @@ impl Simulation {
             energy.translation += 0.5 * m * v.norm_squared();
             energy.rotation += 0.5 * SPHERE_INERTIA * m * r * r * w.norm_squared();
         }
-        let width = self.law.history();
+        let width = self.layout.history;
         for (chunk, k) in self.reach.pairs() {
             let (i, j) = (chunk.i[k] as usize, chunk.j[k] as usize);
             let (a, b) = (&self.grains.place[i], &self.grains.place[j]);
             let apart = self.domain.nearest_image(vector(a) - vector(b)).norm();
-            let history: Vec<f64> = chunk.history[k / 4 * width..][..width]
-                .iter()
-                .map(|row| row[k % 4])
-                .collect();
-            self.add_elastic(
+            let history = self.history_of(chunk, k);
+            let pair = self.pair(i, self.grains.material[j]);
+            let curvature = self.grains.turn[i][3] + self.grains.turn[j][3];
+            self.add_stored(
                 &mut energy,
+                pair,
                 a[3] + b[3] - apart,
-                a[3] * b[3] / (a[3] + b[3]),
-                &history,
+                curvature,
+                &history[..width],
             );
         }
         for contact in &self.plane_contacts.contacts {
             let i = contact.grain as usize;
+            let plane = &self.planes[contact.plane as usize];
             let x = &self.grains.place[i];
-            let overlap = x[3] - self.planes[contact.plane as usize].distance(&vector(x));
+            let overlap = x[3] - plane.distance(&vector(x));
             if !self.grains.is_fixed(i) {
-                self.add_elastic(&mut energy, overlap, x[3], &contact.history[..width]);
+                let pair = self.pair(i, plane.material);
+                let curvature = self.grains.turn[i][3];
+                self.add_stored(
+                    &mut energy,
+                    pair,
+                    overlap,
+                    curvature,
+                    &contact.history[..width],
+                );
             }
         }
         energy
     }
 
-    fn add_elastic(&self, energy: &mut Energy, overlap: f64, reduced_radius: f64, history: &[f64]) {
-        if overlap <= 0.0 {
+    /// History of a pair within reach.
+    fn history_of(&self, chunk: &Chunk, pair: usize) -> [f64; HISTORY_MAX] {
+        let width = self.layout.history;
+        let mut history = [0.0; HISTORY_MAX];
+        let block = &chunk.history[pair / 4 * width..][..width];
+        for (h, row) in history.iter_mut().zip(block) {
+            *h = row[pair % 4];
+        }
+        history
+    }
+
+    /// Whether a history is that of an adhesive contact, which may hold across a gap.
+    fn holds(&self, history: &[f64]) -> bool {
+        self.layout.holds && history[self.layout.history - 1] != 0.0
+    }
+
+    /// Row of the law table for a grain and a material.
+    fn pair(&self, grain: usize, material: u16) -> usize {
+        usize::from(self.grains.material[grain]) * self.law.materials() + usize::from(material)
+    }
+
+    fn add_stored(
+        &self,
+        energy: &mut Energy,
+        pair: usize,
+        overlap: f64,
+        curvature: f64,
+        history: &[f64],
+    ) {
+        // A contact that holds across a gap is known by its history.
+        if overlap <= 0.0 && !self.holds(history) {
             return;
         }
-        let square = |h: &[f64]| h.iter().map(|x| x * x).sum::<f64>();
-        let (normal, tangential) = (&self.law.normal, &self.law.tangential);
-        energy.normal += 0.5 * normal.stiffness * overlap * overlap;
-        energy.tangential += 0.5 * tangential.stiffness(normal) * square(&history[..3]);
-        if let Some(shape) = &self.law.rolling {
-            let k_r = shape.rolling_stiffness(normal, reduced_radius);
-            let k_t = shape.twisting_stiffness(normal, tangential, reduced_radius);
-            energy.rolling += 0.5 * k_r * square(&history[3..6]);
-            energy.twisting += 0.5 * k_t * history[6] * history[6];
-        }
+        let stored = self.law.visit(Store {
+            pair,
+            overlap,
+            curvature,
+            history,
+        });
+        energy.normal += stored.normal;
+        energy.cohesion += stored.cohesion;
+        energy.tangential += stored.tangential;
+        energy.rolling += stored.rolling;
+        energy.twisting += stored.twisting;
     }
 
     /// Momentum of the free grains at this instant (N s).
@@ -233,7 +292,7 @@ impl Simulation {
                 rows[i].iter().for_each(|x| hash.take(x.to_bits()));
             }
         }
-        let width = self.law.history();
+        let width = self.layout.history;
         let mut contacts: Vec<_> = self
             .reach
             .pairs()

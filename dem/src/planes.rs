@@ -1,6 +1,6 @@
 //! Plane walls: the same contact laws with a partner of infinite mass and radius.
 
-use crate::contact::{HISTORY_ROLLING, Interaction, Lever, Step, Touch};
+use crate::contact::{HISTORY_MAX, Interaction, Lever, Step, Touch};
 use crate::grains::Grains;
 use crate::lanes::Vec3;
 use crate::neighbours::Row;
@@ -13,6 +13,8 @@ pub struct Plane {
     pub point: Vector3<f64>,
     /// Unit normal, into the grains.
     pub normal: Vector3<f64>,
+    /// Number of its material in the law table.
+    pub material: u16,
 }
 
 impl Plane {
@@ -27,7 +29,7 @@ impl Plane {
 pub(crate) struct PlaneContact {
     pub grain: u32,
     pub plane: u32,
-    pub history: [f64; HISTORY_ROLLING],
+    pub history: [f64; HISTORY_MAX],
     /// Force, moment of the tangential force, further moment on the grain.
     pub slot: [[f64; 4]; 3],
 }
@@ -94,7 +96,7 @@ impl PlaneContacts {
                     self.contacts.push(PlaneContact {
                         grain: g,
                         plane: p as u32,
-                        history: known.map_or([0.0; HISTORY_ROLLING], |k| self.old[k].history),
+                        history: known.map_or([0.0; HISTORY_MAX], |k| self.old[k].history),
                         slot: [[0.0; 4]; 3],
                     });
                 }
@@ -154,10 +156,18 @@ impl PlaneContacts {
             let g = c.grain as usize;
             let (x, v, s) = (&grains.place[g], &grains.motion[g], &grains.turn[g]);
             let plane = &planes[c.plane as usize];
+            let pair =
+                usize::from(grains.material[g]) * law.materials() + usize::from(plane.material);
+            let coefficients = &law.table()[pair];
             let distance = plane.distance(&crate::grains::vector(x));
             let overlap = x[3] - distance;
-            if overlap <= 0.0 || v[3] == 0.0 {
-                c.history = [0.0; HISTORY_ROLLING];
+            let held = if I::HOLDS && c.history[I::HISTORY - 1] != 0.0 {
+                law.hold(coefficients, s[3])
+            } else {
+                0.0
+            };
+            if overlap <= -held || v[3] == 0.0 {
+                c.history = [0.0; HISTORY_MAX];
                 c.slot = [[0.0; 4]; 3];
                 continue;
             }
@@ -174,8 +184,9 @@ impl PlaneContacts {
                 spin: Vec3([s[0], s[1], s[2]]).scale(s[3]),
                 inverse_mass: v[3],
                 curvature: s[3],
+                inverse_inertia: v[3] * s[3] * s[3],
             };
-            let wrench = law.wrench(&touch, &mut c.history, step);
+            let wrench = law.wrench(coefficients, &touch, &mut c.history, step);
             let torque = wrench.tangential.cross(normal).scale(arm);
             c.slot = [wrench.force, torque, wrench.moment].map(|v| [v.0[0], v.0[1], v.0[2], 0.0]);
             deepest = deepest.max(overlap * s[3]);

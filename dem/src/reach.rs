@@ -138,6 +138,8 @@ pub(crate) struct Making<'a> {
     pub images: Images,
     /// Numbers of history of a contact.
     pub width: usize,
+    /// Largest gap that any established contact holds across (m).
+    pub hold: f64,
 }
 
 /// Grains that are moved together, directly after their forces, while their rows are in the cache.
@@ -336,7 +338,7 @@ impl Chunk {
     /// then lists the partners that each grain touches.
     fn compact(&mut self, width: usize, mut see: impl FnMut(u32, u32, &[f64])) {
         let mut kept = 0;
-        let mut block = [[0.0; 4]; crate::contact::HISTORY_ROLLING];
+        let mut block = [[0.0; 4]; crate::contact::HISTORY_MAX];
         let flat = self.history.as_flattened_mut();
         self.touched.clear();
         self.first_touched.clear();
@@ -401,6 +403,7 @@ impl Chunk {
             list,
             images,
             width,
+            hold,
         } = *making;
         let (touched, first_touched) = (&self.touched, &self.first_touched);
         self.i.clear();
@@ -410,7 +413,7 @@ impl Chunk {
         let mut next = 0;
         for i in self.grains.clone() {
             let xi = &grains.place[i];
-            let near = xi[3] + skin;
+            let near = xi[3] + skin + hold;
             let end = first_touched[i - self.grains.start + 1] as usize;
             for &j in list.partners(i) {
                 let xj = &grains.place[j as usize];
@@ -452,7 +455,7 @@ impl Chunk {
         let mut from = (padded - touched.len()) * width;
         flat.copy_within(..touched.len() * width, from);
         let mut next = 0;
-        let mut block = [[0.0; 4]; crate::contact::HISTORY_ROLLING];
+        let mut block = [[0.0; 4]; crate::contact::HISTORY_MAX];
         for k in (0..padded).step_by(4) {
             block[..width].fill([0.0; 4]);
             for lane in 0..(self.count - k).min(4) {

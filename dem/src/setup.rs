@@ -1,6 +1,9 @@
 //! What a simulation starts from, and what is wrong with it.
 
-use crate::contact::ContactLaw;
+use crate::contact::{
+    Cohesion, ContactLaw, Damping, Elasticity, LawTable, Laws, Normal, Rolling, SpringStiffness,
+    Tangential,
+};
 use crate::domain::Domain;
 use crate::grains::Grain;
 use crate::planes::Plane;
@@ -23,8 +26,8 @@ pub struct Setup {
     pub domain: Domain,
     /// Acceleration of gravity (m/s²).
     pub gravity: Vector3<f64>,
-    /// What touching surfaces do to each other.
-    pub law: ContactLaw,
+    /// What touching surfaces do to each other, for all pairs of materials.
+    pub law: Laws,
     /// The grains; their order is their number.
     pub grains: Vec<Grain>,
     /// Plane walls.
@@ -61,6 +64,20 @@ pub enum SetupError {
         /// What it must be (m).
         least: f64,
     },
+    /// Parts of a law that do not go together.
+    #[error("contact: {0}")]
+    Composition(&'static str),
+    /// Laws of two materials that cannot be mixed.
+    #[error("contact: materials with different kinds of {0} cannot be mixed: give the pair's law")]
+    Mixture(String),
+    /// A material that no law is for.
+    #[error("material {material}: there are laws for {materials} materials, numbered from 0")]
+    Material {
+        /// The number used.
+        material: usize,
+        /// How many there are.
+        materials: usize,
+    },
     /// A preparation was stopped by its observer.
     #[error("preparation was interrupted")]
     Interrupted,
@@ -88,50 +105,127 @@ pub(crate) fn check(
     })
 }
 
-impl ContactLaw {
-    /// Checks every number of the law.
-    pub fn validate(&self) -> Result<(), SetupError> {
-        let (n, t) = (&self.normal, &self.tangential);
-        check("contact.stiffness", n.stiffness, "> 0 N/m", |v| v > 0.0)?;
-        check("contact.restitution", n.restitution, "in (0, 1]", |v| {
-            v > 0.0 && v <= 1.0
-        })?;
-        check(
-            "contact.tangential_stiffness_ratio",
-            t.stiffness_ratio,
-            "≥ 0",
-            |v| v >= 0.0,
-        )?;
-        check(
-            "contact.tangential_restitution",
-            t.restitution,
-            "in (0, 1]",
-            |v| v > 0.0 && v <= 1.0,
-        )?;
-        check("contact.friction", t.friction, "≥ 0", |v| v >= 0.0)?;
-        if let Some(shape) = &self.rolling {
-            check("contact.beta", shape.beta, "≥ 0", |v| v >= 0.0)?;
-            check(
-                "contact.rolling_friction",
-                shape.rolling_friction,
-                "≥ 0",
-                |v| v >= 0.0,
-            )?;
-            check(
-                "contact.twisting_friction",
-                shape.twisting_friction,
-                "≥ 0",
-                |v| v >= 0.0,
-            )?;
+fn positive(key: &str, value: f64) -> Result<(), SetupError> {
+    check(key, value, "> 0", |v| v > 0.0)
+}
+
+fn not_negative(key: &str, value: f64) -> Result<(), SetupError> {
+    check(key, value, "≥ 0", |v| v >= 0.0)
+}
+
+fn restitution(key: &str, value: f64) -> Result<(), SetupError> {
+    check(key, value, "in (0, 1]", |v| v > 0.0 && v <= 1.0)
+}
+
+fn damping(prefix: &str, damping: &Damping) -> Result<(), SetupError> {
+    match *damping {
+        Damping::Restitution(e) => restitution(&format!("contact.{prefix}restitution"), e),
+        Damping::MassProportional(rate) => {
+            not_negative(&format!("contact.{prefix}damping_rate"), rate)
         }
-        Ok(())
+    }
+}
+
+fn elasticity(material: &Elasticity) -> Result<(), SetupError> {
+    positive("contact.youngs_modulus", material.youngs_modulus)?;
+    check(
+        "contact.poissons_ratio",
+        material.poissons_ratio,
+        "in (-1, 0.5]",
+        |v| v > -1.0 && v <= 0.5,
+    )
+}
+
+impl ContactLaw {
+    /// Checks every number of the law, and that its parts go together.
+    pub fn validate(&self) -> Result<(), SetupError> {
+        match &self.normal {
+            Normal::Hooke(hooke) => {
+                check("contact.stiffness", hooke.stiffness, "> 0 N/m", |v| v > 0.0)?;
+                damping("", &hooke.damping)?;
+            }
+            Normal::Hertz(hertz) => {
+                positive("contact.effective_modulus", hertz.effective_modulus)?;
+                restitution("contact.restitution", hertz.restitution)?;
+            }
+            Normal::Viscoelastic(v) => {
+                positive("contact.effective_modulus", v.effective_modulus)?;
+                not_negative("contact.dissipation", v.dissipation)?;
+            }
+            Normal::Jkr(jkr) => {
+                elasticity(&jkr.elasticity)?;
+                positive("contact.surface_energy", jkr.surface_energy)?;
+                not_negative("contact.damping_rate", jkr.damping_rate)?;
+                positive("contact.critical_rolling", jkr.critical_rolling)?;
+            }
+        }
+        match &self.tangential {
+            Tangential::None | Tangential::Jkr => {}
+            Tangential::Linear(spring) => {
+                match spring.stiffness {
+                    SpringStiffness::Ratio(ratio) => {
+                        not_negative("contact.tangential_stiffness_ratio", ratio)?;
+                    }
+                    SpringStiffness::Absolute(stiffness) => {
+                        not_negative("contact.tangential_stiffness", stiffness)?;
+                    }
+                }
+                damping("tangential_", &spring.damping)?;
+                not_negative("contact.friction", spring.friction)?;
+            }
+            Tangential::Mindlin(mindlin) => {
+                positive("contact.effective_shear", mindlin.effective_shear)?;
+                restitution("contact.restitution", mindlin.restitution)?;
+                not_negative("contact.friction", mindlin.friction)?;
+            }
+        }
+        match &self.rolling {
+            Rolling::None | Rolling::Jkr => {}
+            Rolling::Epsd(epsd) => {
+                not_negative("contact.rolling_friction", epsd.rolling_friction)?;
+                not_negative("contact.rolling_damping", epsd.damping_ratio)?;
+            }
+            Rolling::Shape(shape) => {
+                not_negative("contact.beta", shape.beta)?;
+                not_negative("contact.rolling_friction", shape.rolling_friction)?;
+                not_negative("contact.twisting_friction", shape.twisting_friction)?;
+            }
+        }
+        let asperity = |radius: Option<f64>| match radius {
+            Some(radius) => positive("contact.asperity_radius", radius),
+            None => Ok(()),
+        };
+        match self.cohesion {
+            Cohesion::None => Ok(()),
+            Cohesion::Dmt {
+                work_of_adhesion,
+                asperity_radius,
+            } => {
+                not_negative("contact.work_of_adhesion", work_of_adhesion)?;
+                asperity(asperity_radius)
+            }
+            Cohesion::Scheeres {
+                cleanliness,
+                asperity_radius,
+            } => {
+                not_negative("contact.cleanliness", cleanliness)?;
+                asperity(asperity_radius)
+            }
+            Cohesion::Constant { strength, patch } => {
+                not_negative("contact.strength", strength)?;
+                not_negative("contact.patch", patch)
+            }
+        }?;
+        crate::contact::Composition::of(&[*self])
+            .map(|_| ())
+            .map_err(SetupError::Composition)
     }
 }
 
 impl Setup {
     /// Checks all numbers; the list's skin decides how narrow a periodic box may be.
-    pub(crate) fn validate(&self, skin: f64) -> Result<(), SetupError> {
-        self.law.validate()?;
+    pub(crate) fn validate(&self, skin: f64) -> Result<LawTable, SetupError> {
+        let law = LawTable::new(&self.law)?;
         check("timestep", self.timestep, "> 0 s", |v| v > 0.0)?;
         for (k, g) in self.gravity.iter().enumerate() {
             check(&format!("gravity[{k}]"), *g, "finite, m/s²", |_| true)?;
@@ -156,6 +250,7 @@ impl Setup {
                     check(&format!("grains[{k}].{name}"), *c, "finite", |_| true)?;
                 }
             }
+            self.known_material(g.material)?;
             largest = largest.max(g.radius);
         }
         for (k, p) in self.planes.iter().enumerate() {
@@ -165,6 +260,7 @@ impl Setup {
                 "a unit vector",
                 |v| (v - 1.0).abs() < 1e-9,
             )?;
+            self.known_material(p.material)?;
         }
         let least = 2.0 * (2.0 * largest + skin);
         for (k, axis) in ['x', 'y', 'z'].into_iter().enumerate() {
@@ -178,6 +274,17 @@ impl Setup {
                 });
             }
         }
-        Ok(())
+        Ok(law)
+    }
+
+    fn known_material(&self, material: u16) -> Result<(), SetupError> {
+        let (material, materials) = (usize::from(material), self.law.own.len());
+        if material < materials {
+            return Ok(());
+        }
+        Err(SetupError::Material {
+            material,
+            materials,
+        })
     }
 }

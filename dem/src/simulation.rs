@@ -1,6 +1,7 @@
 //! The simulation: one state, one step.
 
-use crate::contact::{ContactLaw, HISTORY_ROLLING, Interaction, Rolling, Sliding, Step};
+use crate::contact::composition::Visitor;
+use crate::contact::{ContactLaw, HISTORY_MAX, Interaction, LawTable, Step};
 use crate::contacts::Touching;
 use crate::domain::{Domain, Images};
 use crate::forces::{self, Field};
@@ -13,6 +14,7 @@ use crate::setup::{Setup, SetupError, Threads};
 use crate::snapshot::GrainSample;
 use crate::sweep::{self, Moved, Pass, Sweep};
 use nalgebra::Vector3;
+use std::sync::Arc;
 
 /// The step no longer follows the motion.
 #[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
@@ -33,7 +35,7 @@ pub enum Diverged {
     /// Grains have run through each other.
     #[error(
         "grains overlapped by {overlap:.2} of their radius before t = {time:e} s: the time step of \
-         {timestep:e} s is too long, or the stiffness of {stiffness:e} N/m too low for the speeds"
+         {timestep:e} s is too long, or the grains are too soft for their speeds"
     )]
     Overlap {
         /// Overlap over the harmonic mean radius.
@@ -42,8 +44,6 @@ pub enum Diverged {
         time: f64,
         /// The step (s).
         timestep: f64,
-        /// k_n (N/m).
-        stiffness: f64,
     },
     /// Grains move against each other by more than the search can follow.
     #[error(
@@ -66,36 +66,51 @@ const RUN_THROUGH: f64 = 1.0;
 /// Skin of the Verlet list in smallest-grain diameters, chosen by measurement on the inclined flow.
 const SKIN: f64 = 0.3;
 
-/// Numbers of a contact's history that change sign when its two grains change order.
-const FLIPS: usize = 6;
-
-/// The law of the scene, ready for the inner loop.
+/// What the lists must carry for a law.
 #[derive(Clone, Copy, Debug)]
-enum Kernel {
-    Sliding(Sliding),
-    Rolling(Rolling),
+pub(crate) struct Layout {
+    /// Numbers of history of a contact.
+    pub history: usize,
+    /// How many of them change sign with the order of a pair.
+    pub flips: usize,
+    /// Rows of a contact's slot.
+    pub slot_rows: usize,
+    /// Whether contacts hold across a gap.
+    pub holds: bool,
 }
 
-impl Kernel {
-    fn new(law: &ContactLaw) -> Kernel {
-        match &law.rolling {
-            None => Kernel::Sliding(Sliding::new(law)),
-            Some(shape) => Kernel::Rolling(Rolling::new(law, shape)),
+struct LayoutOf;
+
+impl Visitor for LayoutOf {
+    type Output = Layout;
+    fn visit<I: Interaction>(self, _: &I) -> Layout {
+        Layout {
+            history: I::HISTORY,
+            flips: I::FLIPS,
+            slot_rows: forces::slot_rows::<I>(),
+            holds: I::HOLDS,
         }
     }
+}
 
-    fn slot_rows(&self) -> usize {
-        match self {
-            Kernel::Sliding(_) => forces::slot_rows::<Sliding>(),
-            Kernel::Rolling(_) => forces::slot_rows::<Rolling>(),
-        }
+/// A pass over all grains under the scene's law.
+struct RunPass<'a> {
+    simulation: &'a mut Simulation,
+    pass: Pass,
+    kick: f64,
+}
+
+impl Visitor for RunPass<'_> {
+    type Output = f64;
+    fn visit<I: Interaction>(self, law: &I) -> f64 {
+        self.simulation.pass_law(law, self.pass, self.kick)
     }
 }
 
 /// Histories of all plane contacts.
 #[derive(Clone, Debug, Default)]
 struct Springs {
-    planes: Vec<[f64; HISTORY_ROLLING]>,
+    planes: Vec<[f64; HISTORY_MAX]>,
     springs_current: bool,
 }
 
@@ -104,10 +119,12 @@ struct Springs {
 pub struct Simulation {
     pub(crate) domain: Domain,
     pub(crate) gravity: Vector3<f64>,
-    pub(crate) law: ContactLaw,
+    pub(crate) law: Arc<LawTable>,
+    pub(crate) layout: Layout,
+    /// Largest gap that any established contact holds across (m).
+    hold: f64,
     pub(crate) planes: Vec<Plane>,
     pub(crate) timestep: f64,
-    kernel: Kernel,
     parallel: bool,
     skin: f64,
     largest_radius: f64,
@@ -157,12 +174,14 @@ impl Simulation {
         let smallest = radii().fold(f64::INFINITY, f64::min);
         let largest_radius = radii().fold(0.0, f64::max);
         let skin = SKIN * 2.0 * if smallest.is_finite() { smallest } else { 1.0 };
-        setup.validate(skin)?;
+        let law = setup.validate(skin)?;
+        let hold = |law: &ContactLaw| law.reach(largest_radius);
         Ok(Simulation {
             domain: setup.domain,
             gravity: setup.gravity,
-            kernel: Kernel::new(&setup.law),
-            law: setup.law,
+            layout: law.visit(LayoutOf),
+            hold: law.laws().iter().map(hold).fold(0.0, f64::max),
+            law: Arc::new(law),
             planes: setup.planes,
             timestep: setup.timestep,
             parallel: setup.threads == Threads::Rayon,
@@ -261,10 +280,12 @@ impl Simulation {
     }
 
     fn pass(&mut self, pass: Pass, kick: f64) {
-        let deepest = match self.kernel {
-            Kernel::Sliding(law) => self.pass_law(&law, pass, kick),
-            Kernel::Rolling(law) => self.pass_law(&law, pass, kick),
-        };
+        let law = Arc::clone(&self.law);
+        let deepest = law.visit(RunPass {
+            simulation: self,
+            pass,
+            kick,
+        });
         self.deepest = self.deepest.max(deepest);
     }
 
@@ -275,7 +296,7 @@ impl Simulation {
             stretch: if stretch { self.timestep } else { 0.0 },
         };
         self.springs_current = true;
-        let lever = self.law.lever;
+        let lever = self.law.lever();
         let walls = if pass == Pass::Motion {
             0.0
         } else {
@@ -291,8 +312,10 @@ impl Simulation {
                 place: &grains.place,
                 motion: &grains.motion,
                 turn: &grains.turn,
+                material: &grains.material,
                 images: Images::of(&self.domain),
                 lever,
+                hold: self.hold,
                 step,
             },
             planes: &self.plane_contacts,
@@ -367,7 +390,6 @@ impl Simulation {
                 overlap: self.deepest,
                 time,
                 timestep,
-                stiffness: self.law.normal.stiffness,
             });
         }
         let n = self.grains.len();
@@ -388,17 +410,18 @@ impl Simulation {
             &mut self.grains,
             &self.domain,
             self.largest_radius,
-            self.skin,
+            self.skin + self.hold,
             self.parallel,
         );
-        let (width, list, touching) = (self.law.history(), &self.list, &mut self.touching);
+        let (width, list, touching) = (self.layout.history, &self.list, &mut self.touching);
+        let (flips, listed) = (self.layout.flips, self.skin + self.hold);
         touching.clear(width);
         self.reach.surrender(width, |i, j, history| {
             let (i, j) = (list.new_index(i), list.new_index(j));
-            touching.push(i, j, history, FLIPS);
+            touching.push(i, j, history, flips);
         });
         self.plane_contacts
-            .build(&self.planes, &self.grains, &list.rows, self.skin, |old| {
+            .build(&self.planes, &self.grains, &list.rows, listed, |old| {
                 list.new_index(old)
             });
         self.renew_rows();
@@ -425,7 +448,8 @@ impl Simulation {
             grains: &self.grains,
             list: &self.list,
             images: Images::of(&self.domain),
-            width: self.law.history(),
+            width: self.layout.history,
+            hold: self.hold,
         };
         if cut {
             self.touching.order(self.grains.len());
@@ -438,10 +462,11 @@ impl Simulation {
 
     /// Takes up histories of touching contacts i < j, as a checkpoint has them.
     pub(crate) fn take_histories(&mut self, pairs: &[[u32; 2]], histories: &[f64]) {
-        let width = self.law.history();
+        let width = self.layout.history;
+        let flips = self.layout.flips;
         self.touching.clear(width);
         for (&[i, j], history) in pairs.iter().zip(histories.chunks_exact(width)) {
-            self.touching.push(i, j, history, FLIPS);
+            self.touching.push(i, j, history, flips);
         }
         self.make_reach(true);
     }
@@ -457,7 +482,7 @@ impl Simulation {
 
     /// Rows of a contact's slot under the scene's law.
     pub(crate) fn slot_rows(&self) -> usize {
-        self.kernel.slot_rows()
+        self.layout.slot_rows
     }
 
     /// Sets the velocities of all free grains; spins and contacts stay.
@@ -530,8 +555,8 @@ impl Simulation {
         &self.domain
     }
 
-    /// The contact law.
-    pub fn law(&self) -> &ContactLaw {
+    /// The laws of all pairs of materials.
+    pub fn law(&self) -> &LawTable {
         &self.law
     }
 

@@ -11,7 +11,7 @@
 //! cuts.
 
 use crate::contact::Interaction;
-use crate::forces::{Field, batch, slot_rows};
+use crate::forces::{Field, batch, like_coefficients, slot_rows};
 use crate::lanes::{Lanes4, Portable, has_avx2};
 use crate::motion::{ALL, Body, Motion, Sum, sums};
 use crate::neighbours::Row;
@@ -225,6 +225,9 @@ fn chunk_in<L: Lanes4, I: Interaction, const ROWS: usize>(
     let n = chunk.grains.len();
     let mut block = [[[0.0; 4]; ROWS]; BLOCK];
     let mut deepest = L::splat(0.0);
+    let like = like_coefficients::<L, I>(law);
+    // What a scene does not have costs nothing: one material reads no table.
+    let mixed = law.materials() > 1;
     let (mut evaluated, mut exported) = (0, 0);
     let mut cursor = Cursor::default();
     let mut shared = 0;
@@ -236,15 +239,15 @@ fn chunk_in<L: Lanes4, I: Interaction, const ROWS: usize>(
             let end = chunk.pairs_before[from / BLOCK] as usize;
             while evaluated < end {
                 let (k, at) = (evaluated, (evaluated & mask) * rows);
-                batch::<L, I>(
-                    law,
-                    &sweep.field,
-                    &chunk.i[k..k + 4],
-                    &chunk.j[k..k + 4],
-                    &mut chunk.history[k / 4 * I::HISTORY..][..I::HISTORY],
-                    &mut chunk.slots[at..at + 4 * rows],
-                    &mut deepest,
-                );
+                let (i, j) = (&chunk.i[k..k + 4], &chunk.j[k..k + 4]);
+                let history = &mut chunk.history[k / 4 * I::HISTORY..][..I::HISTORY];
+                let slots = &mut chunk.slots[at..at + 4 * rows];
+                let field = &sweep.field;
+                if mixed {
+                    batch::<L, I, true>(law, &like, field, i, j, history, slots, &mut deepest);
+                } else {
+                    batch::<L, I, false>(law, &like, field, i, j, history, slots, &mut deepest);
+                }
                 evaluated += 4;
             }
             while exported < chunk.exported.len() && (chunk.exported[exported] as usize) < end {

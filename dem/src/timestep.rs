@@ -20,19 +20,19 @@ pub fn step(mass: f64, stiffness: f64, steps_per_contact: f64) -> f64 {
     PI * (mass / (2.0 * stiffness)).sqrt() / steps_per_contact
 }
 
-/// The step at which leap-frog becomes unstable for a grain of `mass` (kg) held by one spring of the
-/// law against a fixed partner, `2/ω` (s); packed grains have several contacts and less room.
+/// The step at which leap-frog becomes unstable for a grain of `mass` (kg) and `radius` (m) held by one
+/// contact of the law under `overlap` (m) against a fixed partner, `2/ω` (s); packed grains have several
+/// contacts and less room.
 ///
-/// Dashpots are left out; at ε = 0.5 they lower it by less than a fifth. The fastest of the normal, tangential (which also turns the grain) and rolling oscillations counts.
-pub fn stability_limit(law: &ContactLaw, mass: f64) -> f64 {
-    let k_n = law.normal.stiffness;
-    let k_t = law.tangential.stiffness(&law.normal);
-    // Tangential: 1/m + R²/I = 7/(2m). Rolling about a wall: k_n (βR)² over 2/5 m R².
-    let beta2 = law.rolling.map_or(0.0, |s| s.beta * s.beta);
-    let stiffest = k_n
-        .max(3.5 * k_t)
-        .max(2.5 * k_n * beta2)
-        .max(2.5 * 2.0 * k_t * beta2);
+/// Dashpots are left out; at ε = 0.5 they lower it by less than a fifth. The fastest of the normal,
+/// tangential (which also turns the grain), rolling and twisting oscillations counts.
+pub fn stability_limit(law: &ContactLaw, mass: f64, radius: f64, overlap: f64) -> f64 {
+    let k = law.stiffness(radius, overlap);
+    // Tangential: 1/m + R²/I = 7/(2m). Rolling and twisting about a wall: over 2/5 m R².
+    let stiffest = k
+        .normal
+        .max(3.5 * k.tangential)
+        .max(2.5 * k.rolling.max(k.twisting) / (radius * radius));
     2.0 * (mass / stiffest).sqrt()
 }
 
@@ -55,19 +55,11 @@ mod tests {
 
     #[test]
     fn the_limit_is_two_over_the_fastest_frequency() {
-        let law = ContactLaw {
-            normal: Hooke {
-                stiffness: 400.0,
-                restitution: 1.0,
-            },
-            tangential: TangentialSpring {
-                stiffness_ratio: 2.0 / 7.0,
-                restitution: 1.0,
-                friction: 0.5,
-            },
-            rolling: None,
-            lever: Default::default(),
-        };
-        assert!((stability_limit(&law, 1.0) - 0.1).abs() < 1e-15);
+        let law = ContactLaw::linear(
+            Hooke::matched(400.0, 1.0),
+            TangentialSpring::matched(2.0 / 7.0, 1.0, 0.5),
+            None,
+        );
+        assert!((stability_limit(&law, 1.0, 0.5, 1e-3) - 0.1).abs() < 1e-15);
     }
 }

@@ -9,23 +9,15 @@ use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
 fn law() -> ContactLaw {
-    ContactLaw {
-        normal: Hooke {
-            stiffness: 2e4,
-            restitution: 0.5,
-        },
-        tangential: TangentialSpring {
-            stiffness_ratio: 2.0 / 7.0,
-            restitution: 0.5,
-            friction: 1.0,
-        },
-        rolling: Some(ShapeParameter {
+    ContactLaw::linear(
+        Hooke::matched(2e4, 0.5),
+        TangentialSpring::matched(2.0 / 7.0, 0.5, 1.0),
+        Some(ShapeParameter {
             beta: 0.2,
             rolling_friction: 1.05,
             twisting_friction: 1.3,
         }),
-        lever: Lever::ContactPoint,
-    }
+    )
 }
 
 /// 1 500 grains: enough for a step to be split over threads.
@@ -56,11 +48,12 @@ fn setup(threads: Threads) -> Setup {
     Setup {
         domain: bed().domain,
         gravity: Vector3::new(slope.sin(), 0.0, -slope.cos()),
-        law: law(),
+        law: law().into(),
         grains: bed().grains.clone(),
         planes: vec![Plane {
             point: Vector3::new(0.0, 0.0, bed().domain.lower.z),
             normal: Vector3::z(),
+            material: 0,
         }],
         timestep: 5e-4,
         threads,

@@ -9,23 +9,15 @@ use nalgebra::Vector3;
 const DENSITY: f64 = 6.0 / std::f64::consts::PI;
 
 fn law(restitution: f64, friction: f64, beta: Option<f64>) -> ContactLaw {
-    ContactLaw {
-        normal: Hooke {
-            stiffness: 2e5,
-            restitution,
-        },
-        tangential: TangentialSpring {
-            stiffness_ratio: 2.0 / 7.0,
-            restitution,
-            friction,
-        },
-        rolling: beta.map(|beta| ShapeParameter {
+    ContactLaw::linear(
+        Hooke::matched(2e5, restitution),
+        TangentialSpring::matched(2.0 / 7.0, restitution, friction),
+        beta.map(|beta| ShapeParameter {
             beta,
             rolling_friction: 1.05,
             twisting_friction: 1.3,
         }),
-        lever: Lever::ContactPoint,
-    }
+    )
 }
 
 fn open_box() -> Domain {
@@ -40,8 +32,8 @@ fn setup(law: ContactLaw, grains: Vec<Grain>, planes: Vec<Plane>, steps_per_cont
     Setup {
         domain: open_box(),
         gravity: Vector3::zeros(),
-        timestep: law.normal.contact_time(0.5) / steps_per_contact,
-        law,
+        timestep: law.contact_time(0.5, 0.25, 1.0) / steps_per_contact,
+        law: law.into(),
         grains,
         planes,
         threads: Threads::Serial,
@@ -66,6 +58,7 @@ fn drop_on_floor(law: ContactLaw, degrees: f64, spin: Vector3<f64>, steps: f64) 
     let floor = Plane {
         point: Vector3::zeros(),
         normal: Vector3::z(),
+        material: 0,
     };
     Simulation::new(setup(law, vec![grain], vec![floor], steps)).unwrap()
 }
@@ -105,7 +98,7 @@ fn restitution_and_contact_time_of_a_pair() {
             .collect();
         let apart = (v[0].1 - v[1].1).abs();
         assert!((apart - e).abs() < 1e-3, "ε {e}: {apart}");
-        let time = touched as f64 * s.timestep() / law.normal.contact_time(0.5);
+        let time = touched as f64 * s.timestep() / law.contact_time(0.5, 0.25, 1.0);
         assert!(
             (time - 1.0).abs() < 2e-3,
             "ε {e}: contact time off by {time}"
@@ -251,6 +244,7 @@ fn a_launched_sphere_ends_slipping_at_five_sevenths() {
     let floor = Plane {
         point: Vector3::zeros(),
         normal: Vector3::z(),
+        material: 0,
     };
     let law = law(0.5, 0.5, None);
     let mut setup = setup(law, vec![grain], vec![floor], 40.0);

@@ -72,7 +72,7 @@ fn incline(scene: &Scene, body: &InclineScene) -> Result<String, Failure> {
     let grains = body.free_grains();
     let [length, width] = body.floor_edges();
     let mass = body.mean_mass();
-    let stiffness = law.normal.stiffness;
+    let stiffness = body.stiffness();
     // A dense random packing, for the depth only.
     let depth = grains as f64 * mass / (body.grains.density * 0.57 * length * width);
     lines.say(
@@ -118,7 +118,7 @@ fn incline(scene: &Scene, body: &InclineScene) -> Result<String, Failure> {
         ),
     );
     let smallest = mass * (2.0 * body.smallest_radius() / body.grains.diameter).powi(3);
-    let limit = timestep::stability_limit(&law, smallest);
+    let limit = timestep::stability_limit(&law, smallest, body.smallest_radius(), 0.0);
     lines.say(
         "time step",
         &format!(

@@ -7,7 +7,7 @@ pub use starts::{StartError, chute_start, read_start, settle_start, settled_star
 use colluvium_coupling::incline::{InclineSpec, Purpose, Start};
 use colluvium_dem::preparation::{Bed, InclineBed, RadiusLaw, settle_incline_bed};
 use colluvium_dem::{
-    ContactLaw, Hooke, Lever, SetupError, ShapeParameter, TangentialSpring, Threads, timestep,
+    ContactLaw, Hooke, SetupError, ShapeParameter, TangentialSpring, Threads, timestep,
 };
 use std::ops::ControlFlow;
 
@@ -18,23 +18,15 @@ pub const STIFFNESS: f64 = 2e4;
 
 /// The thesis' material (Thuillet 2019, Tab. 2.1) at a shape parameter β, or round without one.
 pub fn material(beta: Option<f64>) -> ContactLaw {
-    ContactLaw {
-        normal: Hooke {
-            stiffness: STIFFNESS,
-            restitution: 0.5,
-        },
-        tangential: TangentialSpring {
-            stiffness_ratio: 2.0 / 7.0,
-            restitution: 0.5,
-            friction: 1.0,
-        },
-        rolling: beta.map(|beta| ShapeParameter {
+    ContactLaw::linear(
+        Hooke::matched(STIFFNESS, 0.5),
+        TangentialSpring::matched(2.0 / 7.0, 0.5, 1.0),
+        beta.map(|beta| ShapeParameter {
             beta,
             rolling_friction: 1.05,
             twisting_friction: 1.3,
         }),
-        lever: Lever::ContactPoint,
-    }
+    )
 }
 
 /// Contact time over 30 (Eq. 2.7).

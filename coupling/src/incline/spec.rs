@@ -220,7 +220,7 @@ impl InclineSpec {
         Setup {
             domain: self.domain,
             gravity: self.gravity * Vector3::new(self.slope.sin(), 0.0, -self.slope.cos()),
-            law: self.law,
+            law: self.law.into(),
             grains,
             planes: Vec::new(),
             timestep: self.timestep,

@@ -9,13 +9,13 @@
 //! ```
 //! ω_R, ω_T (rad/s) relative angular velocity in the contact plane and about its normal, δ their
 //! integrals (rad); μ is the sliding coefficient, which stands in the twisting limit only. The moment
-//! acts against ω on `i`, opposite on `j`. Source: Thuillet 2019, Eq. 2.11–2.13 (after Zhang et al.
+//! acts against ω on `i`, opposite on `j`. k_n, C_n, k_t and C_t are those of the normal and tangential
+//! parts; over a Hertz contact k_n is the secant stiffness. Source: Thuillet 2019, Eq. 2.11–2.13 (after Zhang et al.
 //! 2017). The limit acts as [`super::slider`] says; the source limits the spring only.
 
-use super::hooke::Hooke;
+use super::composition::{Pressing, RollingPart, Shear, Turn};
 use super::slider::{slide, slide_scalar};
-use super::tangential::TangentialSpring;
-use super::{Step, Touch};
+use super::{Step, Tangential, Touch};
 use crate::lanes::{Lane, Vec3};
 use serde::{Deserialize, Serialize};
 
@@ -31,85 +31,84 @@ pub struct ShapeParameter {
 }
 
 impl ShapeParameter {
-    pub(super) fn coefficients(
-        &self,
-        normal: &Hooke,
-        tangential: &TangentialSpring,
-    ) -> Coefficients {
-        Coefficients {
-            beta: self.beta,
-            rolling_stiffness: normal.stiffness,
-            rolling_damping: normal.damping_factor(),
-            rolling_limit: self.rolling_friction,
-            twisting_stiffness: 2.0 * tangential.stiffness(normal),
-            twisting_damping: 2.0 * tangential.damping_factor(normal),
-            twisting_limit: self.twisting_friction * tangential.friction,
-        }
+    pub(super) fn coefficients(&self, tangential: &Tangential) -> [f64; 3] {
+        let friction = match tangential {
+            Tangential::Linear(spring) => spring.friction,
+            Tangential::Mindlin(mindlin) => mindlin.friction,
+            Tangential::None | Tangential::Jkr => 0.0,
+        };
+        [
+            self.beta,
+            self.rolling_friction,
+            self.twisting_friction * friction,
+        ]
     }
 
-    /// Rolling stiffness k_R (N m/rad) at a reduced radius (m).
-    pub fn rolling_stiffness(&self, normal: &Hooke, reduced_radius: f64) -> f64 {
-        normal.stiffness * (self.beta * reduced_radius).powi(2)
+    /// k_R (N m/rad) over a normal stiffness (N/m) at a reduced radius (m).
+    pub fn rolling_stiffness(&self, normal: f64, reduced_radius: f64) -> f64 {
+        normal * (self.beta * reduced_radius).powi(2)
     }
 
-    /// Twisting stiffness k_T (N m/rad) at a reduced radius (m).
-    pub fn twisting_stiffness(
-        &self,
-        normal: &Hooke,
-        tangential: &TangentialSpring,
-        reduced_radius: f64,
-    ) -> f64 {
-        2.0 * tangential.stiffness(normal) * (self.beta * reduced_radius).powi(2)
+    /// k_T (N m/rad) over a tangential stiffness (N/m) at a reduced radius (m).
+    pub fn twisting_stiffness(&self, tangential: f64, reduced_radius: f64) -> f64 {
+        2.0 * tangential * (self.beta * reduced_radius).powi(2)
     }
 }
 
-/// The law in the inner loop.
+/// In the inner loop: β, μ_R, μ_T μ.
 #[derive(Clone, Copy, Debug)]
-pub struct Coefficients {
-    beta: f64,
-    rolling_stiffness: f64,
-    rolling_damping: f64,
-    rolling_limit: f64,
-    twisting_stiffness: f64,
-    twisting_damping: f64,
-    twisting_limit: f64,
-}
+pub struct Springs;
 
-impl Coefficients {
-    /// Moment on `i`, and the rolling and twisting displacements left.
+impl RollingPart for Springs {
+    const COEFFICIENTS: usize = 3;
+    const SPRING: bool = true;
+    const TWISTS: bool = true;
+    const STIFFENS: bool = true;
+    const INERTIA: bool = false;
+
     #[inline(always)]
-    pub fn moment<L: Lane>(
-        &self,
+    fn turn<L: Lane>(
+        c: &[L],
         touch: &Touch<L>,
         rolled: Vec3<L>,
         twisted: L,
-        normal_force: L,
+        kept: L,
+        pressing: &Pressing<L>,
+        shear: &Shear<L>,
         step: Step,
-    ) -> (Vec3<L>, Vec3<L>, L) {
-        let patch = L::splat(self.beta) / touch.curvature;
+    ) -> Turn<L> {
+        let patch = c[0] / touch.curvature;
         let patch2 = patch * patch;
-        let inverse_root = L::splat(1.0) / touch.inverse_mass.sqrt();
+        let two = L::splat(2.0);
         let stretch = L::splat(step.stretch);
-        let limit = patch * normal_force;
+        let limit = patch * pressing.force.abs();
 
         let twist_rate = touch.spin.dot(touch.normal);
         let roll_rate = touch.spin - touch.normal.scale(twist_rate);
         let (rolling, rolled) = slide(
-            (rolled + roll_rate.scale(stretch)).reject(touch.normal),
+            (rolled.scale(kept) + roll_rate.scale(stretch)).reject(touch.normal),
             roll_rate,
-            L::splat(self.rolling_stiffness) * patch2,
-            L::splat(self.rolling_damping) * inverse_root * patch2,
-            L::splat(self.rolling_limit) * limit,
+            pressing.stiffness * patch2,
+            pressing.damping * patch2,
+            c[1] * limit,
         );
         let (twisting, twisted) = slide_scalar(
-            twisted + twist_rate * stretch,
+            twisted * kept + twist_rate * stretch,
             twist_rate,
-            L::splat(self.twisting_stiffness) * patch2,
-            L::splat(self.twisting_damping) * inverse_root * patch2,
-            L::splat(self.twisting_limit) * limit,
+            two * shear.stiffness * patch2,
+            two * shear.damping * patch2,
+            c[2] * limit,
         );
-        let moment = -(rolling + touch.normal.scale(twisting));
-        (moment, rolled, twisted)
+        Turn {
+            moment: -(rolling + touch.normal.scale(twisting)),
+            rolled,
+            twisted,
+        }
+    }
+
+    fn stiffness(c: &[f64], curvature: f64, normal: f64, tangential: f64) -> (f64, f64) {
+        let patch2 = (c[0] / curvature).powi(2);
+        (normal * patch2, 2.0 * tangential * patch2)
     }
 }
 
@@ -117,49 +116,44 @@ impl Coefficients {
 mod tests {
     use super::*;
 
-    /// Equal grains of radius 1 (R = 1/2), k_n 1000, k_t 2000/7, no dashpots.
-    fn springs(beta: f64) -> Coefficients {
-        let normal = Hooke {
-            stiffness: 1000.0,
-            restitution: 1.0,
-        };
-        let tangential = TangentialSpring {
-            stiffness_ratio: 2.0 / 7.0,
-            restitution: 1.0,
-            friction: 0.5,
-        };
-        ShapeParameter {
-            beta,
-            rolling_friction: 1.05,
-            twisting_friction: 1.3,
-        }
-        .coefficients(&normal, &tangential)
-    }
-
-    fn touch(spin: [f64; 3]) -> Touch<f64> {
-        Touch {
+    /// Equal grains of radius 1 (R = 1/2), k_n 1000, k_t 2000/7, no dashpots, μ 0.5.
+    fn moment(beta: f64, spin: [f64; 3], load: f64) -> Turn<f64> {
+        let touch = Touch {
             normal: Vec3([0.0, 0.0, 1.0]),
             overlap: 1e-3,
             velocity: Vec3::zero(),
             spin: Vec3(spin),
             inverse_mass: 2.0,
             curvature: 2.0,
-        }
+            inverse_inertia: 2.0,
+        };
+        let pressing = Pressing {
+            force: load,
+            stiffness: 1000.0,
+            damping: 0.0,
+            memory: 0.0,
+        };
+        let shear = Shear {
+            force: Vec3::zero(),
+            spring: Vec3::zero(),
+            stiffness: 2000.0 / 7.0,
+            damping: 0.0,
+        };
+        let c = [beta, 1.05, 1.3 * 0.5];
+        let step = Step { stretch: 1e-3 };
+        Springs::turn(&c, &touch, Vec3::zero(), 0.0, 1.0, &pressing, &shear, step)
     }
-
-    const STEP: Step = Step { stretch: 1e-3 };
 
     #[test]
     fn stiffness_and_limits_are_those_of_the_thesis() {
         let beta = 0.4;
-        let (m, rolled, twisted) =
-            springs(beta).moment(&touch([0.3, 0.0, 0.5]), Vec3::zero(), 0.0, 1e9, STEP);
+        let turn = moment(beta, [0.3, 0.0, 0.5], 1e9);
         let patch2 = (beta * 0.5_f64).powi(2);
-        assert!((m.0[0] + 1000.0 * patch2 * 3e-4).abs() < 1e-15);
-        assert!((m.0[2] + 2.0 * 2000.0 / 7.0 * patch2 * 5e-4).abs() < 1e-15);
-        assert_eq!((rolled.0[0], twisted), (3e-4, 5e-4));
+        assert!((turn.moment.0[0] + 1000.0 * patch2 * 3e-4).abs() < 1e-15);
+        assert!((turn.moment.0[2] + 2.0 * 2000.0 / 7.0 * patch2 * 5e-4).abs() < 1e-15);
+        assert_eq!((turn.rolled.0[0], turn.twisted), (3e-4, 5e-4));
 
-        let (m, ..) = springs(beta).moment(&touch([1e6, 0.0, 1e6]), Vec3::zero(), 0.0, 2.0, STEP);
+        let m = moment(beta, [1e6, 0.0, 1e6], 2.0).moment;
         assert!((m.0[0] + 1.05 * beta * 0.5 * 2.0).abs() < 1e-12);
         assert!(
             (m.0[2] + 1.3 * beta * 0.5 * 0.5 * 2.0).abs() < 1e-12,
@@ -169,7 +163,6 @@ mod tests {
 
     #[test]
     fn round_grains_roll_freely() {
-        let (m, ..) = springs(0.0).moment(&touch([3.0, 1.0, 2.0]), Vec3::zero(), 0.0, 5.0, STEP);
-        assert_eq!(m.norm(), 0.0);
+        assert_eq!(moment(0.0, [3.0, 1.0, 2.0], 5.0).moment.norm(), 0.0);
     }
 }

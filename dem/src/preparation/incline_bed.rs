@@ -97,11 +97,12 @@ pub fn settle_incline_bed(
     let floor = Plane {
         point: Vector3::zeros(),
         normal: Vector3::z(),
+        material: 0,
     };
     let mut simulation = Simulation::new(Setup {
         domain,
         gravity: Vector3::new(0.0, 0.0, -spec.gravity),
-        law: spec.law,
+        law: spec.law.into(),
         grains: cloud,
         planes: vec![floor],
         timestep: spec.timestep,
@@ -250,23 +251,15 @@ mod tests {
             density: 6.0 / std::f64::consts::PI,
             length: 6.0,
             width: 5.0,
-            law: ContactLaw {
-                normal: Hooke {
-                    stiffness: 2e4,
-                    restitution: 0.5,
-                },
-                tangential: TangentialSpring {
-                    stiffness_ratio: 2.0 / 7.0,
-                    restitution: 0.5,
-                    friction: 1.0,
-                },
-                rolling: Some(ShapeParameter {
+            law: ContactLaw::linear(
+                Hooke::matched(2e4, 0.5),
+                TangentialSpring::matched(2.0 / 7.0, 0.5, 1.0),
+                Some(ShapeParameter {
                     beta: 0.2,
                     rolling_friction: 1.05,
                     twisting_friction: 1.3,
                 }),
-                lever: Default::default(),
-            },
+            ),
             gravity: 1.0,
             timestep: 5e-4,
             seed,

@@ -9,7 +9,7 @@ use crate::scene::{ImpactScene, RollingKeys, Scene};
 use crate::summary::{Model, Quantity, Summary};
 use crate::table::Table;
 use colluvium_dem::{
-    ContactLaw, Domain, Grain, GrainSample, Hooke, Lever, Plane, Record, Setup, SetupError,
+    ContactLaw, Domain, Grain, GrainSample, Hooke, Plane, Record, Setup, SetupError,
     ShapeParameter, Simulation, Snapshot, TangentialSpring, Threads,
 };
 use nalgebra::Vector3;
@@ -95,23 +95,20 @@ pub fn shape(keys: Option<&RollingKeys>) -> Option<ShapeParameter> {
 
 /// Sets an impact up; `pair` for two spheres, else the plane z = 0.
 pub fn prepare(scene: &ImpactScene, pair: bool) -> Impact {
-    let law = ContactLaw {
-        normal: Hooke {
-            stiffness: scene.stiffness,
-            restitution: scene.restitution,
-        },
-        tangential: TangentialSpring {
-            stiffness_ratio: scene.stiffness_ratio,
-            restitution: scene.tangential_restitution,
-            friction: scene.friction,
-        },
-        rolling: shape(scene.rolling.as_ref()),
-        lever: Lever::default(),
-    };
+    let law = ContactLaw::linear(
+        Hooke::matched(scene.stiffness, scene.restitution),
+        TangentialSpring::matched(
+            scene.stiffness_ratio,
+            scene.tangential_restitution,
+            scene.friction,
+        ),
+        shape(scene.rolling.as_ref()),
+    );
     let mass = scene.mass();
     let reduced_mass = if pair { 0.5 * mass } else { mass };
     let undamped = PI * (reduced_mass / scene.stiffness).sqrt();
-    let contact_time = law.normal.contact_time(reduced_mass);
+    let contact_time =
+        Hooke::matched(scene.stiffness, scene.restitution).contact_time(reduced_mass);
 
     let angle = scene.impact_degrees.to_radians();
     let (tangential, normal) = (scene.speed * angle.sin(), scene.speed * angle.cos());
@@ -135,6 +132,7 @@ pub fn prepare(scene: &ImpactScene, pair: bool) -> Impact {
         planes.push(Plane {
             point: Vector3::zeros(),
             normal: Vector3::z(),
+            material: 0,
         });
     }
     let duration = if scene.duration > 0.0 {
@@ -143,7 +141,7 @@ pub fn prepare(scene: &ImpactScene, pair: bool) -> Impact {
         approach + 2.0 * contact_time
     };
     let reach = 20.0 * radius + scene.gap;
-    let step = choose(undamped, scene.steps_per_contact, &law, mass);
+    let step = choose(undamped, scene.steps_per_contact, &law, mass, radius);
     Impact {
         setup: Setup {
             domain: Domain {
@@ -152,7 +150,7 @@ pub fn prepare(scene: &ImpactScene, pair: bool) -> Impact {
                 periodic: [false; 3],
             },
             gravity: Vector3::new(0.0, 0.0, -scene.gravity),
-            law,
+            law: law.into(),
             grains,
             planes,
             timestep: step.seconds,

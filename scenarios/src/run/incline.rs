@@ -15,9 +15,7 @@ use colluvium_coupling::incline::{
     InclineError, InclineResult, InclineRun, InclineSpec, Outcome, Purpose, SeriesPoint, Start,
 };
 use colluvium_dem::preparation::{Bed, InclineBed, RadiusLaw, settle_incline_bed};
-use colluvium_dem::{
-    ContactLaw, Hooke, Lever, SetupError, Snapshot, TangentialSpring, Threads, timestep,
-};
+use colluvium_dem::{ContactLaw, Hooke, SetupError, Snapshot, TangentialSpring, Threads, timestep};
 use std::ops::ControlFlow;
 
 /// Steps between two looks at the clock.
@@ -46,19 +44,15 @@ pub fn left_out(scene: &InclineScene) -> Vec<String> {
 /// The contact law of a scene.
 pub fn law(scene: &InclineScene) -> ContactLaw {
     let contact = &scene.contact;
-    ContactLaw {
-        normal: Hooke {
-            stiffness: scene.stiffness(),
-            restitution: contact.restitution,
-        },
-        tangential: TangentialSpring {
-            stiffness_ratio: contact.stiffness_ratio,
-            restitution: contact.tangential_restitution,
-            friction: contact.friction,
-        },
-        rolling: shape(contact.rolling.as_ref()),
-        lever: Lever::default(),
-    }
+    ContactLaw::linear(
+        Hooke::matched(scene.stiffness(), contact.restitution),
+        TangentialSpring::matched(
+            contact.stiffness_ratio,
+            contact.tangential_restitution,
+            contact.friction,
+        ),
+        shape(contact.rolling.as_ref()),
+    )
 }
 
 /// The time step of a scene: that of two mean grains (Eq. 2.7) unless the smallest needs a finer one.
@@ -70,6 +64,7 @@ pub fn step(scene: &InclineScene) -> Step {
         scene.timestep.steps_per_contact,
         &law(scene),
         scene.mean_mass() * smallest.powi(3),
+        scene.smallest_radius(),
     )
 }
 

@@ -22,9 +22,11 @@ pub fn choose(
     steps_per_contact: f64,
     law: &ContactLaw,
     smallest_mass: f64,
+    smallest_radius: f64,
 ) -> Step {
     let contact = contact_time / steps_per_contact;
-    let stability = SHARE_OF_STABILITY * timestep::stability_limit(law, smallest_mass);
+    let stability =
+        SHARE_OF_STABILITY * timestep::stability_limit(law, smallest_mass, smallest_radius, 0.0);
     if contact <= stability {
         Step {
             seconds: contact,
