@@ -64,7 +64,7 @@ fn mixed_coefficients<L: Lanes4, I: Interaction>(
 /// Evaluates the law on four pairs.
 #[allow(clippy::too_many_arguments)]
 #[inline(always)]
-pub(crate) fn batch<L: Lanes4, I: Interaction, const MIXED: bool>(
+pub(crate) fn batch<L: Lanes4, I: Interaction>(
     law: &I,
     like: &[L; COEFFICIENTS],
     field: &Field,
@@ -100,8 +100,9 @@ pub(crate) fn batch<L: Lanes4, I: Interaction, const MIXED: bool>(
     }
     let [vx, vy, vz, inverse_mass] = combine(field.motion, i, j, minus);
     let [sx, sy, sz, curvature] = combine(field.turn, i, j, one);
+    // What a scene does not have costs nothing: one material reads no table.
     let mixed;
-    let coefficients = if MIXED {
+    let coefficients = if law.materials() > 1 {
         mixed = mixed_coefficients::<L, I>(law, field.material, i, j);
         &mixed
     } else {

@@ -226,8 +226,6 @@ fn chunk_in<L: Lanes4, I: Interaction, const ROWS: usize>(
     let mut block = [[[0.0; 4]; ROWS]; BLOCK];
     let mut deepest = L::splat(0.0);
     let like = like_coefficients::<L, I>(law);
-    // What a scene does not have costs nothing: one material reads no table.
-    let mixed = law.materials() > 1;
     let (mut evaluated, mut exported) = (0, 0);
     let mut cursor = Cursor::default();
     let mut shared = 0;
@@ -243,11 +241,7 @@ fn chunk_in<L: Lanes4, I: Interaction, const ROWS: usize>(
                 let history = &mut chunk.history[k / 4 * I::HISTORY..][..I::HISTORY];
                 let slots = &mut chunk.slots[at..at + 4 * rows];
                 let field = &sweep.field;
-                if mixed {
-                    batch::<L, I, true>(law, &like, field, i, j, history, slots, &mut deepest);
-                } else {
-                    batch::<L, I, false>(law, &like, field, i, j, history, slots, &mut deepest);
-                }
+                batch::<L, I>(law, &like, field, i, j, history, slots, &mut deepest);
                 evaluated += 4;
             }
             while exported < chunk.exported.len() && (chunk.exported[exported] as usize) < end {

@@ -14,7 +14,6 @@
 //! The attraction jumps from 0 to F_c at first touch and back at the last, so an impact neither gains
 //! nor loses by it: its energy is -F_c x at an overlap x.
 
-use super::composition::CohesionPart;
 use crate::lanes::Lane;
 use serde::{Deserialize, Serialize};
 use std::f64::consts::PI;
@@ -80,18 +79,14 @@ impl Cohesion {
     }
 }
 
-/// In the inner loop: the polynomial.
-#[derive(Clone, Copy, Debug)]
-pub struct Pull;
+/// Numbers of the polynomial.
+pub(super) const COEFFICIENTS: usize = 3;
 
-impl CohesionPart for Pull {
-    const COEFFICIENTS: usize = 3;
-
-    #[inline(always)]
-    fn pull<L: Lane>(c: &[L], curvature: L) -> L {
-        let radius = L::splat(1.0) / curvature;
-        c[0] + radius * (c[1] + radius * c[2])
-    }
+/// F_c (N) in the inner loop.
+#[inline(always)]
+pub(super) fn pull<L: Lane>(c: &[L], curvature: L) -> L {
+    let radius = L::splat(1.0) / curvature;
+    c[0] + radius * (c[1] + radius * c[2])
 }
 
 #[cfg(test)]
@@ -126,6 +121,6 @@ mod tests {
         };
         assert!((patch.force(0.01) - 10.0 * 4.0 * (0.005_f64).powi(2)).abs() < 1e-18);
         let c = patch.coefficients();
-        assert_eq!(Pull::pull(&c, 100.0), patch.force(0.01));
+        assert_eq!(pull(&c, 100.0), patch.force(0.01));
     }
 }

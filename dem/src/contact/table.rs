@@ -24,6 +24,8 @@ pub struct Table {
     pub(crate) rows: Vec<[f64; COEFFICIENTS]>,
     /// Number of materials.
     pub(crate) materials: usize,
+    /// Whether any pair has a cohesion.
+    pub(crate) cohesive: bool,
 }
 
 /// The laws that a scene names.
@@ -86,6 +88,7 @@ impl LawTable {
         let table = Table {
             rows: laws.iter().map(|law| row(law, &laws)).collect(),
             materials,
+            cohesive: laws.iter().any(|law| law.cohesion != Cohesion::None),
         };
         Ok(LawTable {
             laws,
@@ -382,10 +385,8 @@ mod tests {
         })
         .unwrap();
         assert_eq!(*table.between(1, 0), given);
-        assert!(matches!(
-            table.composition(),
-            Composition::HertzMindlin { cohesive: true }
-        ));
+        assert_eq!(table.composition(), Composition::HertzMindlin);
+        assert!(table.table().cohesive);
         // Coefficients of the part that only one has are zero for the others.
         assert_eq!(table.table().rows[3][6..9], [0.0; 3]);
         assert!(table.table().rows[0][7] > 0.0);
