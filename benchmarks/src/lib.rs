@@ -22,7 +22,7 @@ pub fn sheared_bed(
     let mut simulation = Simulation::new(Setup {
         domain: bed.domain,
         gravity: Vector3::new(slope.sin(), 0.0, -slope.cos()),
-        law,
+        law: law.into(),
         grains: bed.grains,
         planes: Vec::new(),
         timestep: step(),

@@ -50,6 +50,7 @@ pub fn read_start(file: &str, gzipped: &[u8]) -> Result<Vec<Grain>, StartError> 
                 radius: row.radius,
                 density: row.density,
                 fixed: row.r#type == Some(FROZEN),
+                material: 0,
             })
         })
         .collect::<Result<_, csv::Error>>()
