@@ -1,5 +1,7 @@
 //! Cases that benchmarks share, so that speed is measured on what the tests check.
 
+pub mod peers;
+
 use colluvium_continuum::bagnold::BagnoldCase;
 use colluvium_continuum::rheology::MuI;
 use colluvium_dem::{Setup, SetupError, Simulation, Threads};
