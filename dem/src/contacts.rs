@@ -1,72 +1,95 @@
 //! Histories of touching contacts on their way from one list to the next.
 
+use crate::grains::Next;
 use std::ops::Range;
 
 /// Touching contacts by their lower grain.
+///
+/// They live for a moment only, while no step is being made: in the rows that steps write to, which
+/// are three for each grain. A contact takes a row or two, its partner last.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Touching {
     width: usize,
+    /// Rows of a contact.
+    rows: usize,
     /// Contacts of grain i: `first[i]..first[i + 1]`.
     first: Vec<u32>,
-    partner: Vec<u32>,
-    history: Vec<f64>,
-    /// Contacts as they come in.
-    pairs: Vec<[u32; 2]>,
-    incoming: Vec<f64>,
+    /// The borrowed rows, and more where they do not suffice.
+    parts: [Vec<[f64; 4]>; 4],
+    part: usize,
 }
 
 impl Touching {
-    /// Forgets everything.
-    pub fn clear(&mut self, width: usize) {
+    /// Makes ready for contacts between `n` grains.
+    pub fn open(&mut self, width: usize, n: usize, next: &mut Next) {
         self.width = width;
-        self.pairs.clear();
-        self.incoming.clear();
-    }
-
-    /// Takes in a contact. Where `j < i` it is turned round, and its first `flips` numbers change
-    /// sign: vectors of i against j, but not the twist about the normal.
-    pub fn push(&mut self, i: u32, j: u32, history: &[f64], flips: usize) {
-        self.pairs.push([i.min(j), i.max(j)]);
-        let sign = if j < i { -1.0 } else { 1.0 };
-        let turned = history.iter().enumerate();
-        self.incoming
-            .extend(turned.map(|(k, &h)| if k < flips { sign * h } else { h }));
-    }
-
-    /// Orders the contacts of `n` grains by their lower grain.
-    pub fn order(&mut self, n: usize) {
-        let width = self.width;
+        self.rows = (width + 1).div_ceil(4);
         self.first.clear();
         self.first.resize(n + 2, 0);
-        for &[i, _] in &self.pairs {
-            self.first[i as usize + 2] += 1;
-        }
-        for i in 2..n + 2 {
-            self.first[i] += self.first[i - 1];
-        }
-        self.partner.clear();
-        self.partner.resize(self.pairs.len(), 0);
-        self.history.clear();
-        self.history.resize(self.pairs.len() * width, 0.0);
-        for (c, &[i, j]) in self.pairs.iter().enumerate() {
-            let at = self.first[i as usize + 1] as usize;
-            self.first[i as usize + 1] += 1;
-            self.partner[at] = j;
-            self.history[at * width..][..width]
-                .copy_from_slice(&self.incoming[c * width..][..width]);
-        }
-        self.first.truncate(n + 1);
+        self.part = n + 1;
+        next.lend(&mut self.parts);
     }
 
-    /// Contacts whose lower grain is one of `grains`.
-    pub fn count(&self, grains: &Range<usize>) -> usize {
+    /// Counts a contact, before any is put down.
+    pub fn count(&mut self, i: u32, j: u32) {
+        self.first[i.min(j) as usize + 2] += 1;
+    }
+
+    /// Makes room for those counted.
+    pub fn lay(&mut self) {
+        for i in 2..self.first.len() {
+            self.first[i] += self.first[i - 1];
+        }
+        let all = self.first.last().map_or(0, |&c| c as usize) * self.rows;
+        let beyond = all.saturating_sub(3 * self.part);
+        self.parts[3].resize(beyond, [0.0; 4]);
+    }
+
+    /// Puts down a contact. Where `j < i` it is turned round, and its first `flips` numbers change
+    /// sign: vectors of i against j, but not the twist about the normal.
+    pub fn put(&mut self, i: u32, j: u32, history: &[f64], flips: usize) {
+        let at = &mut self.first[i.min(j) as usize + 1];
+        let contact = *at as usize;
+        *at += 1;
+        let sign = if j < i { -1.0 } else { 1.0 };
+        for (k, &h) in history.iter().enumerate() {
+            *self.number(contact, k) = if k < flips { sign * h } else { h };
+        }
+        *self.number(contact, 4 * self.rows - 1) = f64::from(i.max(j));
+    }
+
+    fn number(&mut self, contact: usize, k: usize) -> &mut f64 {
+        let row = contact * self.rows + k / 4;
+        let part = (row / self.part).min(3);
+        &mut self.parts[part][row - part * self.part][k % 4]
+    }
+
+    fn read(&self, contact: usize, k: usize) -> f64 {
+        let row = contact * self.rows + k / 4;
+        let part = (row / self.part).min(3);
+        self.parts[part][row - part * self.part][k % 4]
+    }
+
+    /// Contacts whose lower grain is one of `grains`, all being put down.
+    pub fn counted(&self, grains: &Range<usize>) -> usize {
         (self.first[grains.end] - self.first[grains.start]) as usize
     }
 
-    /// History of the contact of `i` with `j > i`.
-    pub fn of(&self, i: usize, j: u32) -> Option<&[f64]> {
-        let own = self.first[i] as usize..self.first[i + 1] as usize;
-        let at = self.partner[own.clone()].iter().position(|&p| p == j)? + own.start;
-        Some(&self.history[at * self.width..][..self.width])
+    /// Copies out the history of the contact of `i` with `j > i`, if there is one.
+    pub fn copy(&self, i: usize, j: u32, history: &mut [f64]) -> bool {
+        for contact in self.first[i] as usize..self.first[i + 1] as usize {
+            if self.read(contact, 4 * self.rows - 1) == f64::from(j) {
+                for (k, h) in history.iter_mut().enumerate() {
+                    *h = self.read(contact, k);
+                }
+                return true;
+            }
+        }
+        false
+    }
+
+    /// Gives the rows back.
+    pub fn close(&mut self, next: &mut Next) {
+        next.take_back(&mut self.parts);
     }
 }

@@ -73,9 +73,25 @@ pub(crate) struct Next {
     pub place: Vec<[f64; 4]>,
     pub motion: Vec<[f64; 4]>,
     pub turn: Vec<[f64; 4]>,
-    mass: Vec<f64>,
-    id: Vec<u32>,
-    material: Vec<u16>,
+}
+
+impl Next {
+    /// Lends its rows to somebody who needs room between steps.
+    pub fn lend(&mut self, rows: &mut [Vec<[f64; 4]>; 4]) {
+        std::mem::swap(&mut self.place, &mut rows[0]);
+        std::mem::swap(&mut self.motion, &mut rows[1]);
+        std::mem::swap(&mut self.turn, &mut rows[2]);
+    }
+
+    /// Takes them back.
+    pub fn take_back(&mut self, rows: &mut [Vec<[f64; 4]>; 4]) {
+        self.lend(rows);
+        for rows in [&mut self.place, &mut self.motion, &mut self.turn] {
+            if let Some(dummy) = rows.last_mut() {
+                *dummy = [0.0; 4];
+            }
+        }
+    }
 }
 
 impl Grains {
@@ -133,20 +149,20 @@ impl Grains {
             next.push([0.0; 4]);
             std::mem::swap(rows, next);
         }
-        self.next.mass.clear();
-        let masses = order.iter().map(|&o| self.mass[o as usize]);
-        self.next.mass.extend(masses);
-        std::mem::swap(&mut self.mass, &mut self.next.mass);
-        self.next.id.clear();
-        self.next
-            .id
-            .extend(order.iter().map(|&o| self.id[o as usize]));
-        std::mem::swap(&mut self.id, &mut self.next.id);
-        self.next.material.clear();
-        let materials = order.iter().map(|&o| self.material[o as usize]);
-        self.next.material.extend(materials);
-        self.next.material.push(0);
-        std::mem::swap(&mut self.material, &mut self.next.material);
+        // The rows in the making have room for the narrow arrays.
+        for (room, &o) in self.next.place.iter_mut().zip(order) {
+            *room = [
+                self.mass[o as usize],
+                f64::from(self.id[o as usize]),
+                f64::from(self.material[o as usize]),
+                0.0,
+            ];
+        }
+        let ordered = self.mass.iter_mut().zip(&mut self.id);
+        let ordered = ordered.zip(&mut self.material);
+        for (((mass, id), material), room) in ordered.zip(&self.next.place) {
+            (*mass, *id, *material) = (room[0], room[1] as u32, room[2] as u16);
+        }
     }
 
     /// Makes the rows that a step has written the present ones.

@@ -15,15 +15,44 @@ use crate::lanes::{Lanes4, Portable};
 use crate::planes::PlaneContacts;
 use crate::reach::{Chunk, Reach, SHARES, Shared};
 
-/// Slots of all pairs are there: no place is used twice.
-pub(crate) const ALL: usize = usize::MAX;
+/// Where the slots of the pairs evaluated last are found: pair k at k modulo the ring's length.
+#[derive(Clone, Copy)]
+pub(crate) struct Ring {
+    base: usize,
+    len: usize,
+}
+
+impl Ring {
+    /// Slots of all pairs are there: no place is used twice.
+    pub const ALL: usize = usize::MAX;
+
+    /// The ring when all pairs before `end` have been evaluated.
+    #[inline(always)]
+    pub fn at(end: usize, len: usize) -> Self {
+        let oldest = end.saturating_sub(len);
+        Ring {
+            base: oldest - oldest % len,
+            len,
+        }
+    }
+
+    /// Place of the slot of one of the last `len` pairs.
+    #[inline(always)]
+    pub fn place(self, pair: usize) -> usize {
+        let place = pair - self.base;
+        if place < self.len {
+            place
+        } else {
+            place - self.len
+        }
+    }
+}
 
 /// Force, moment of the tangential force, further moment on a grain.
 #[derive(Clone, Copy)]
 pub(crate) struct Sum<L>(pub [L; 3]);
 
-/// Sums over a chunk's own pairs for the grains from `from` to `to` (of the chunk); `mask` says where
-/// in `slots` a pair's slot is.
+/// Sums over a chunk's own pairs for the grains from `from` to `to` (of the chunk).
 ///
 /// One loop over the terms of all grains without a branch in it: loops over the few terms of each
 /// grain end unpredictably, which costs more than the sums.
@@ -31,7 +60,7 @@ pub(crate) struct Sum<L>(pub [L; 3]);
 pub(crate) fn sums<L: Lanes4, const ROWS: usize>(
     chunk: &Chunk,
     [from, to]: [usize; 2],
-    mask: usize,
+    ring: Ring,
     sums: &mut [[[f64; 4]; ROWS]],
 ) {
     let zero = L::splat(0.0);
@@ -40,7 +69,7 @@ pub(crate) fn sums<L: Lanes4, const ROWS: usize>(
     let terms = chunk.first_term[from] as usize..chunk.first_term[to] as usize;
     let mut next = 0;
     for &term in &chunk.terms[terms] {
-        let slot = &slots[term.pair() & mask];
+        let slot = &slots[ring.place(term.pair())];
         let [force, torque] = SHARES[term.share()];
         next += term.first();
         let fresh = zero.less(L::splat([0.0, 1.0][term.first()]));
@@ -147,14 +176,14 @@ pub(crate) fn gather(
 ) -> [[f64; 4]; 3] {
     let chunk = reach.chunk_of(g);
     let own = g - chunk.grains.start;
-    let own = [own, own + 1];
+    let (own, ring) = ([own, own + 1], Ring::at(0, Ring::ALL));
     let mut sum = if rows == 2 {
         let mut two = [[[0.0; 4]; 2]];
-        sums::<Portable, 2>(chunk, own, ALL, &mut two);
+        sums::<Portable, 2>(chunk, own, ring, &mut two);
         Sum::<Portable>::load(&two[0])
     } else {
         let mut three = [[[0.0; 4]; 3]];
-        sums::<Portable, 3>(chunk, own, ALL, &mut three);
+        sums::<Portable, 3>(chunk, own, ring, &mut three);
         Sum::load(&three[0])
     };
     let shared = |s: &Shared| s.grain as usize;

@@ -119,7 +119,6 @@ pub(crate) struct Neighbours {
 /// Buffers of a build, kept between builds.
 #[derive(Clone, Debug, Default)]
 struct Build {
-    cell: Vec<u32>,
     cell_first: Vec<u32>,
     order: Vec<u32>,
     new_index: Vec<u32>,
@@ -137,6 +136,9 @@ struct Part {
 
 /// Rows handled by one task of a build: small enough to share, large enough not to matter.
 const ROWS_A_PART: usize = 16;
+
+/// Parts that each thread works on between two times of putting results together.
+const PARTS_A_THREAD: usize = 8;
 
 impl Neighbours {
     /// Sorts the grains and lists all pairs closer than `R_i + R_j + skin`.
@@ -196,13 +198,15 @@ impl Neighbours {
         let n = grains.len();
         let b = &mut self.build;
         let cells = self.grid.cells.iter().product::<usize>();
-        b.cell.clear();
-        b.cell
+        // Cells first; each is replaced by its grain's new place.
+        b.new_index.clear();
+        b.new_index.reserve_exact(n);
+        b.new_index
             .extend(grains.place[..n].iter().map(|x| self.grid.index(x) as u32));
         b.cell_first.clear();
         // Counted two places on: filling moves each cell's start to its end, one place on.
         b.cell_first.resize(cells + 2, 0);
-        for &c in &b.cell {
+        for &c in &b.new_index {
             b.cell_first[c as usize + 2] += 1;
         }
         for c in 2..cells + 2 {
@@ -210,13 +214,11 @@ impl Neighbours {
         }
         b.order.clear();
         b.order.resize(n, 0);
-        b.new_index.clear();
-        b.new_index.resize(n, 0);
-        for (old, &c) in b.cell.iter().enumerate() {
-            let new = b.cell_first[c as usize + 1];
-            b.cell_first[c as usize + 1] += 1;
-            b.order[new as usize] = old as u32;
-            b.new_index[old] = new;
+        for (old, place) in b.new_index.iter_mut().enumerate() {
+            let next = &mut b.cell_first[*place as usize + 1];
+            *place = *next;
+            *next += 1;
+            b.order[*place as usize] = old as u32;
         }
         b.cell_first.truncate(cells + 1);
         grains.reorder(&b.order);
@@ -271,29 +273,37 @@ impl Neighbours {
 
     fn find_pairs(&mut self, grains: &Grains, domain: &Domain, skin: f64, parallel: bool) {
         let rows = self.rows.len();
-        let parts = rows.div_ceil(ROWS_A_PART);
-        self.build.parts.resize_with(parts, Part::default);
-        for (p, part) in self.build.parts.iter_mut().enumerate() {
-            part.rows = p * ROWS_A_PART..((p + 1) * ROWS_A_PART).min(rows);
-        }
         let mut parts = std::mem::take(&mut self.build.parts);
-        let (grid, first) = (&self.grid, &self.build.cell_first);
-        let search = |part: &mut Part| search_rows(part, grid, first, grains, domain, skin);
-        if parallel {
-            parts.par_iter_mut().for_each(search);
+        let threads = if parallel {
+            rayon::current_num_threads()
         } else {
-            parts.iter_mut().for_each(search);
-        }
+            1
+        };
+        // A few parts at a time, so that pairs are not held twice.
+        parts.resize_with((PARTS_A_THREAD * threads).max(1), Part::default);
         self.first.clear();
         self.first.push(0);
         self.partner.clear();
+        let (grid, first) = (&self.grid, &self.build.cell_first);
+        let search = |part: &mut Part| search_rows(part, grid, first, grains, domain, skin);
         let mut total = 0;
-        for part in &parts {
-            for &count in &part.counts {
-                total += count;
-                self.first.push(total);
+        for group in (0..rows).step_by(ROWS_A_PART * parts.len()) {
+            for (p, part) in parts.iter_mut().enumerate() {
+                let from = (group + p * ROWS_A_PART).min(rows);
+                part.rows = from..(from + ROWS_A_PART).min(rows);
             }
-            self.partner.extend_from_slice(&part.partner);
+            if threads > 1 {
+                parts.par_iter_mut().for_each(search);
+            } else {
+                parts.iter_mut().for_each(search);
+            }
+            for part in &parts {
+                for &count in &part.counts {
+                    total += count;
+                    self.first.push(total);
+                }
+                self.partner.extend_from_slice(&part.partner);
+            }
         }
         self.build.parts = parts;
     }

@@ -94,7 +94,7 @@ pub(crate) struct Chunk {
     pub history: Vec<[f64; 4]>,
     /// Rows for each pair: force, moment of the tangential force, further moment.
     pub slots: Vec<[f64; 4]>,
-    /// Slots that must be kept at a time while the chunk is swept: a power of two.
+    /// Slots that must be kept at a time while the chunk is swept: a multiple of four.
     pub ring: usize,
     /// Pairs whose `j` lies in a later chunk, and copies of their slots.
     pub exported: Vec<u32>,
@@ -233,7 +233,7 @@ impl Reach {
         self.tune(making.list);
         let skin = self.skin;
         let renew = |chunk: &mut Chunk| {
-            chunk.compact(making.width, |_, _, _| ());
+            chunk.compact(making.width);
             chunk.fill(making, skin);
         };
         if self.chunks.len() > 1 {
@@ -297,11 +297,27 @@ impl Reach {
         }
     }
 
-    /// Takes all histories out of the list, which is empty of them afterwards.
-    pub fn surrender(&mut self, width: usize, mut take: impl FnMut(u32, u32, &[f64])) {
-        for chunk in &mut self.chunks {
-            chunk.compact(width, &mut take);
-            chunk.history.clear();
+    /// Brings all histories to the front of their chunks; the list is of no use until it is made anew.
+    pub fn compact(&mut self, width: usize) {
+        let compact = |chunk: &mut Chunk| chunk.compact(width);
+        if self.chunks.len() > 1 {
+            self.chunks.par_iter_mut().for_each(compact);
+        } else {
+            self.chunks.iter_mut().for_each(compact);
+        }
+    }
+
+    /// Shows the histories that [`Reach::compact`] has left: `see(i, j, history)`.
+    pub fn compacted(&self, width: usize, mut see: impl FnMut(u32, u32, &[f64])) {
+        for chunk in &self.chunks {
+            let histories = chunk.history.as_flattened().chunks_exact(width);
+            let mut contacts = chunk.touched.iter().zip(histories);
+            for (g, own) in chunk.first_touched.windows(2).enumerate() {
+                let i = (chunk.grains.start + g) as u32;
+                for (&j, history) in contacts.by_ref().take((own[1] - own[0]) as usize) {
+                    see(i, j, history);
+                }
+            }
         }
     }
 
@@ -336,7 +352,7 @@ impl Reach {
 impl Chunk {
     /// Brings the histories of touching contacts to the front, contact by contact, in place; `touched`
     /// then lists the partners that each grain touches.
-    fn compact(&mut self, width: usize, mut see: impl FnMut(u32, u32, &[f64])) {
+    fn compact(&mut self, width: usize) {
         let mut kept = 0;
         let mut block = [[0.0; 4]; crate::contact::HISTORY_MAX];
         let flat = self.history.as_flattened_mut();
@@ -361,7 +377,6 @@ impl Chunk {
             for (h, row) in to.iter_mut().zip(&block) {
                 *h = row[k % 4];
             }
-            see(self.i[k], self.j[k], to);
             while grain < self.i[k] {
                 self.first_touched.push(kept as u32);
                 grain += 1;
@@ -381,13 +396,14 @@ impl Chunk {
         self.first_touched.clear();
         self.first_touched.push(0);
         self.history.clear();
-        self.history
-            .resize((touching.count(&self.grains) * width).div_ceil(4), [0.0; 4]);
+        let rows = (touching.counted(&self.grains) * width).div_ceil(4);
+        self.history.resize(rows, [0.0; 4]);
         let flat = self.history.as_flattened_mut();
         for g in self.grains.clone() {
             for &j in making.list.partners(g) {
-                if let Some(history) = touching.of(g, j) {
-                    flat[self.touched.len() * width..][..width].copy_from_slice(history);
+                let at = self.touched.len() * width;
+                // All may have been found already.
+                if at + width <= flat.len() && touching.copy(g, j, &mut flat[at..at + width]) {
                     self.touched.push(j);
                 }
             }
@@ -408,6 +424,12 @@ impl Chunk {
         let (touched, first_touched) = (&self.touched, &self.first_touched);
         self.i.clear();
         self.j.clear();
+        if self.i.capacity() == 0 {
+            // Growing by doubling would leave holes in memory.
+            let listed: usize = self.grains.clone().map(|g| list.partners(g).len()).sum();
+            self.i.reserve_exact(listed);
+            self.j.reserve_exact(listed);
+        }
         self.exported.clear();
         self.outer = 0;
         let mut next = 0;
@@ -531,11 +553,18 @@ impl Chunk {
             end += self.i[end..self.count].partition_point(|&i| i < beyond);
             let needed = end.next_multiple_of(4);
             self.pairs_before.push(needed as u32);
-            let terms = &self.terms[self.first_term[from] as usize..self.first_term[to] as usize];
-            let real = terms.iter().filter(|t| t.0 & NONE == 0);
-            let oldest = real.map(|t| t.pair()).min().unwrap_or(end);
+            let mut oldest = end;
+            let terms = self.first_term[from] as usize..self.first_term[to] as usize;
+            for term in &mut self.terms[terms] {
+                if term.0 & NONE == 0 {
+                    oldest = oldest.min(term.pair());
+                } else {
+                    // Any slot that is there.
+                    *term = Term::new(needed.saturating_sub(1), NONE | FIRST);
+                }
+            }
             longest = longest.max(needed - oldest / 4 * 4);
         }
-        self.ring = longest.next_power_of_two();
+        self.ring = longest;
     }
 }

@@ -413,12 +413,17 @@ impl Simulation {
             self.skin + self.hold,
             self.parallel,
         );
-        let (width, list, touching) = (self.layout.history, &self.list, &mut self.touching);
-        let (flips, listed) = (self.layout.flips, self.skin + self.hold);
-        touching.clear(width);
-        self.reach.surrender(width, |i, j, history| {
-            let (i, j) = (list.new_index(i), list.new_index(j));
-            touching.push(i, j, history, flips);
+        let (list, touching) = (&self.list, &mut self.touching);
+        let (width, flips) = (self.layout.history, self.layout.flips);
+        let listed = self.skin + self.hold;
+        touching.open(width, self.grains.len(), &mut self.grains.next);
+        self.reach.compact(width);
+        self.reach.compacted(width, |i, j, _| {
+            touching.count(list.new_index(i), list.new_index(j));
+        });
+        touching.lay();
+        self.reach.compacted(width, |i, j, history| {
+            touching.put(list.new_index(i), list.new_index(j), history, flips);
         });
         self.plane_contacts
             .build(&self.planes, &self.grains, &list.rows, listed, |old| {
@@ -452,8 +457,8 @@ impl Simulation {
             hold: self.hold,
         };
         if cut {
-            self.touching.order(self.grains.len());
             self.reach.cut(&making, &self.touching, self.parallel);
+            self.touching.close(&mut self.grains.next);
         } else {
             self.reach.renew(&making);
         }
@@ -462,11 +467,15 @@ impl Simulation {
 
     /// Takes up histories of touching contacts i < j, as a checkpoint has them.
     pub(crate) fn take_histories(&mut self, pairs: &[[u32; 2]], histories: &[f64]) {
-        let width = self.layout.history;
-        let flips = self.layout.flips;
-        self.touching.clear(width);
+        let (width, flips) = (self.layout.history, self.layout.flips);
+        self.touching
+            .open(width, self.grains.len(), &mut self.grains.next);
+        for &[i, j] in pairs {
+            self.touching.count(i, j);
+        }
+        self.touching.lay();
         for (&[i, j], history) in pairs.iter().zip(histories.chunks_exact(width)) {
-            self.touching.push(i, j, history, flips);
+            self.touching.put(i, j, history, flips);
         }
         self.make_reach(true);
     }

@@ -13,7 +13,7 @@
 use crate::contact::Interaction;
 use crate::forces::{Field, batch, like_coefficients, slot_rows};
 use crate::lanes::{Lanes4, Portable, has_avx2};
-use crate::motion::{ALL, Body, Motion, Sum, sums};
+use crate::motion::{Body, Motion, Ring, Sum, sums};
 use crate::neighbours::Row;
 use crate::planes::PlaneContacts;
 use crate::reach::{BLOCK, Chunk};
@@ -217,16 +217,16 @@ fn chunk_in<L: Lanes4, I: Interaction, const ROWS: usize>(
     mut moved: Moved,
 ) -> f64 {
     let rows = ROWS;
-    let mask = if sweep.pass == Pass::Step {
-        chunk.ring - 1
+    let ring = if sweep.pass == Pass::Step {
+        chunk.ring
     } else {
-        ALL
+        Ring::ALL
     };
     let n = chunk.grains.len();
     let mut block = [[[0.0; 4]; ROWS]; BLOCK];
     let mut deepest = L::splat(0.0);
     let like = like_coefficients::<L, I>(law);
-    let (mut evaluated, mut exported) = (0, 0);
+    let (mut evaluated, mut at, mut exported) = (0, 0, 0);
     let mut cursor = Cursor::default();
     let mut shared = 0;
     moved.fastest.fill(0.0);
@@ -236,23 +236,29 @@ fn chunk_in<L: Lanes4, I: Interaction, const ROWS: usize>(
         if sweep.pass != Pass::Motion {
             let end = chunk.pairs_before[from / BLOCK] as usize;
             while evaluated < end {
-                let (k, at) = (evaluated, (evaluated & mask) * rows);
+                let k = evaluated;
                 let (i, j) = (&chunk.i[k..k + 4], &chunk.j[k..k + 4]);
                 let history = &mut chunk.history[k / 4 * I::HISTORY..][..I::HISTORY];
-                let slots = &mut chunk.slots[at..at + 4 * rows];
+                let slots = &mut chunk.slots[at * rows..][..4 * rows];
                 let field = &sweep.field;
                 batch::<L, I>(law, &like, field, i, j, history, slots, &mut deepest);
                 evaluated += 4;
+                at += 4;
+                if at == ring {
+                    at = 0;
+                }
             }
+            let ring = Ring::at(evaluated, ring);
             while exported < chunk.exported.len() && (chunk.exported[exported] as usize) < end {
-                let at = (chunk.exported[exported] as usize & mask) * rows;
+                let at = ring.place(chunk.exported[exported] as usize) * rows;
                 chunk.exports[exported * rows..][..rows]
                     .copy_from_slice(&chunk.slots[at..at + rows]);
                 exported += 1;
             }
         }
         if sweep.pass != Pass::Forces {
-            sums::<L, ROWS>(chunk, [from, to], mask, &mut block);
+            let ring = Ring::at(evaluated, ring);
+            sums::<L, ROWS>(chunk, [from, to], ring, &mut block);
             for (g, sum) in (chunk.grains.start + from..chunk.grains.start + to).zip(&block) {
                 if shared < chunk.shared.len() && chunk.shared[shared].grain as usize == g {
                     chunk.partial[shared][..ROWS].copy_from_slice(sum);
