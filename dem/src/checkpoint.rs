@@ -6,7 +6,8 @@
 
 use crate::contact::HISTORY_MAX;
 use crate::grains::{Grains, Next};
-use crate::neighbours::Row;
+use crate::grid::Grid;
+use crate::neighbours::{Level, Row};
 use crate::planes::PlaneContact;
 use crate::record::Record;
 use crate::setup::{Setup, SetupError};
@@ -54,6 +55,9 @@ impl Simulation {
         let drifts: Vec<_> = self.list.rows.iter().map(|r| r.drift).collect();
         numbers("list/row_drift", flatten(&drifts));
         numbers("list/travel", self.list.travel.clone());
+        let levels = self.list.levels.iter();
+        let grids = levels.flat_map(|l| [l.grid.origin, l.grid.inverse_cell, [l.radius, 0.0, 0.0]]);
+        numbers("list/grid", grids.flatten().collect());
         numbers("list/age", vec![self.list.age]);
         let walls = &self.plane_contacts;
         let histories: Vec<_> = walls.contacts.iter().map(|c| c.history).collect();
@@ -74,7 +78,8 @@ impl Simulation {
         counts("list/partner", wide(&self.list.partner));
         let ends: Vec<u32> = self.list.rows.iter().map(|r| r.end).collect();
         counts("list/row_end", wide(&ends));
-        counts("list/cells", self.list.cells().map(|c| c as u64).to_vec());
+        let cells = self.list.levels.iter().flat_map(|l| l.grid.cells);
+        counts("list/cells", cells.map(|c| c as u64).collect());
         let of: Vec<u32> = walls
             .contacts
             .iter()
@@ -164,15 +169,31 @@ impl Simulation {
         let springs = sized("contacts/history", self.layout.history * touching.len())?;
         let ends = narrow("list/row_end", record.counts("list/row_end")?)?;
         let drifts: Vec<[f64; 3]> = rows(sized("list/row_drift", 3 * ends.len())?);
-        let cells: Vec<usize> = record
-            .counts("list/cells")?
-            .iter()
-            .map(|&c| c as usize)
-            .collect();
-        let [nx, ny, nz] = cells[..] else {
-            return Err("array `list/cells` must have 3 numbers".into());
-        };
-        if ny.checked_mul(nz) != Some(ends.len())
+        let cells = record.counts("list/cells")?.as_chunks::<3>().0;
+        let grids = sized("list/grid", 9 * cells.len())?.as_chunks::<9>().0;
+        let mut levels = Vec::new();
+        let mut first_row: usize = 0;
+        for (cells, &[x, y, z, u, v, w, radius, ..]) in cells.iter().zip(grids) {
+            let mut grid = Grid {
+                origin: [x, y, z],
+                inverse_cell: [u, v, w],
+                cells: cells.map(|c| c as usize),
+                periodic: self.domain.periodic,
+                across: [1, 2],
+            };
+            grid.order_axes();
+            let [_, ny, nz] = grid.cells;
+            let rows = ny.checked_mul(nz).filter(|&r| r > 0 && r <= ends.len());
+            let rows = rows.ok_or("array `list/cells` does not fit `list/row_end`")?;
+            levels.push(Level::restored(
+                grid,
+                first_row,
+                radius,
+                self.skin + self.hold,
+            ));
+            first_row += rows;
+        }
+        if first_row != ends.len()
             || ends.last().is_none_or(|&e| e as usize != n)
             || ends.windows(2).any(|w| w[0] > w[1])
         {
@@ -192,7 +213,7 @@ impl Simulation {
         self.list.age = sized("list/age", 1)?[0];
         self.list.first = first;
         self.list.partner = partner;
-        self.list.restore([nx, ny, nz], self.domain.periodic);
+        self.list.restore(levels);
         self.grains = grains;
         self.weigh();
 

@@ -15,6 +15,7 @@ mod domain;
 mod energy;
 mod forces;
 mod grains;
+mod grid;
 mod lanes;
 mod motion;
 mod neighbours;
@@ -29,6 +30,7 @@ mod snapshot;
 mod state_hash;
 mod sweep;
 pub mod timestep;
+mod validity;
 
 pub use contact::{
     Cohesion, ContactLaw, Damping, Elasticity, Epsd, Hertz, Hooke, Jkr, LawTable, Laws, Lever,

@@ -1,101 +1,48 @@
-//! Who may come to touch whom: a cell grid, a Verlet list with a skin, and how long it stays valid.
+//! Who may come to touch whom: cell grids and a Verlet list with a skin.
 //!
-//! Grains are kept sorted by cell, x fastest. All cells with the same (y, z) form a *row*: a
-//! contiguous range of grains. The list holds all pairs closer than `R_i + R_j + skin`, each once,
-//! i < j, ordered by i; it is valid as long as no two grains can have approached by more than the
-//! skin.
+//! Grains are sorted into *levels* by size, a factor of two each and the finest first, so that a few
+//! large grains do not widen the cells of all small ones. Within a level they are kept sorted by
+//! cell, x fastest. All cells along x form a *row*: a contiguous range of grains. Grains of one level
+//! find each other in their own grid; each grain finds larger ones in the coarser grids, whose cells
+//! are wide enough. Grains of similar size make one level.
 //!
-//! **How long is that?** Each row r gets a reference velocity w_r (the mean of its grains when the
-//! list was built) and a travel bound `T_r = Σ dt max |v - w_r|`. Two grains of rows a and b can have
-//! approached by at most `T_a + T_b + |w_a - w_b| t`. Rows up to two apart are checked against the
-//! skin; with cells no narrower than a contact plus the skin, rows further apart are then safe by
-//! the chain of rows between them. A flow as a whole, however fast, and its shear over distances
-//! beyond two cells cost no rebuilds: only motion against the neighbourhood does. The bound needs no
-//! stored positions and does not depend on threads.
+//! The list holds all pairs closer than `R_i + R_j + skin`, each once, i < j, ordered by i; it is valid
+//! as long as no two grains can have approached by more than the skin: see `validity.rs`.
 
 use crate::domain::{Domain, Images};
 use crate::grains::Grains;
+use crate::grid::Grid;
+use crate::validity::{Allowance, Watch};
 use rayon::prelude::*;
+use std::ops::Range;
 
-/// Grains `start..end` share a (y, z) column of cells.
+/// Grains `start..end` share a row of cells.
 #[derive(Clone, Copy, Debug, Default)]
 pub(crate) struct Row {
     pub start: u32,
     pub end: u32,
-    /// Reference velocity w.
+    /// Reference velocity w (m/s).
     pub drift: [f64; 3],
 }
 
-/// The cell grid as it was laid at the last build.
-#[derive(Clone, Debug, Default)]
-struct Grid {
-    origin: [f64; 3],
-    inverse_cell: [f64; 3],
-    cells: [usize; 3],
-    periodic: [bool; 3],
+impl Row {
+    /// Whether no grain is in it.
+    pub fn is_empty(&self) -> bool {
+        self.start == self.end
+    }
 }
 
-impl Grid {
-    fn lay(grains: &Grains, domain: &Domain, reach: f64) -> Grid {
-        let n = grains.len();
-        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
-        for x in &grains.place[..n] {
-            for k in 0..3 {
-                low[k] = low[k].min(x[k]);
-                high[k] = high[k].max(x[k]);
-            }
-        }
-        let mut grid = Grid {
-            periodic: domain.periodic,
-            ..Grid::default()
-        };
-        let lengths = domain.lengths();
-        // Few grains in a large box, or a lone one far away, must not cost a grid of empty cells.
-        let mut stretch = 1.0;
-        loop {
-            for k in 0..3 {
-                let (from, length, size) = if domain.periodic[k] {
-                    (domain.lower[k], lengths[k], reach * stretch)
-                } else {
-                    (low[k], (high[k] - low[k]).max(reach), reach * stretch)
-                };
-                grid.cells[k] = ((length / size) as usize).max(1);
-                grid.origin[k] = from;
-                grid.inverse_cell[k] = grid.cells[k] as f64 / length;
-            }
-            let count = grid.cells.iter().fold(1.0, |c, &m| c * m as f64);
-            if count <= 8.0 * n as f64 + 4096.0 {
-                return grid;
-            }
-            stretch *= 1.5;
-        }
-    }
-
-    fn index(&self, x: &[f64; 4]) -> usize {
-        let mut cell = [0; 3];
-        for k in 0..3 {
-            let c = (x[k] - self.origin[k]) * self.inverse_cell[k];
-            cell[k] = (c.max(0.0) as usize).min(self.cells[k] - 1);
-        }
-        (cell[2] * self.cells[1] + cell[1]) * self.cells[0] + cell[0]
-    }
-
-    /// Distinct cell numbers within `reach` cells of `c` along an axis.
-    fn around(&self, axis: usize, c: usize, reach: isize, into: &mut Vec<usize>) {
-        into.clear();
-        let n = self.cells[axis] as isize;
-        for d in -reach..=reach {
-            let mut m = c as isize + d;
-            if self.periodic[axis] {
-                m = m.rem_euclid(n);
-            } else if m < 0 || m >= n {
-                continue;
-            }
-            if !into.contains(&(m as usize)) {
-                into.push(m as usize);
-            }
-        }
-    }
+/// Grains of similar size and their grid.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Level {
+    pub grid: Grid,
+    pub first_row: usize,
+    /// Largest radius (m).
+    pub radius: f64,
+    /// Skin of the list (m).
+    pub skin: f64,
+    first_cell: usize,
+    count: usize,
 }
 
 /// Verlet list.
@@ -105,14 +52,15 @@ pub(crate) struct Neighbours {
     pub first: Vec<u32>,
     /// The partner j > i of each pair.
     pub partner: Vec<u32>,
+    /// Rows of all levels.
     pub rows: Vec<Row>,
-    /// T of each row since the build (m).
+    /// Travel of each row since the build (m).
     pub travel: Vec<f64>,
     /// Time since the build (s).
     pub age: f64,
-    /// Row pairs up to two apart, a ≤ b.
-    row_pairs: Vec<(u32, u32)>,
-    grid: Grid,
+    pub allowance: Allowance,
+    pub levels: Vec<Level>,
+    pub watch: Watch,
     build: Build,
 }
 
@@ -128,10 +76,11 @@ struct Build {
 /// Pairs found for a range of rows.
 #[derive(Clone, Debug, Default)]
 struct Part {
-    rows: std::ops::Range<usize>,
+    rows: Range<usize>,
     counts: Vec<u32>,
     partner: Vec<u32>,
-    scratch: [Vec<usize>; 3],
+    /// Cells around, along x and the two axes across.
+    around: [Vec<usize>; 3],
 }
 
 /// Rows handled by one task of a build: small enough to share, large enough not to matter.
@@ -140,36 +89,28 @@ const ROWS_A_PART: usize = 16;
 /// Parts that each thread works on between two times of putting results together.
 const PARTS_A_THREAD: usize = 8;
 
+/// More levels than a size ratio of a million needs.
+const LEVELS: usize = 24;
+
 impl Neighbours {
     /// Sorts the grains and lists all pairs closer than `R_i + R_j + skin`.
-    pub fn build(
-        &mut self,
-        grains: &mut Grains,
-        domain: &Domain,
-        largest_radius: f64,
-        skin: f64,
-        parallel: bool,
-    ) {
+    pub fn build(&mut self, grains: &mut Grains, domain: &Domain, skin: f64, parallel: bool) {
         let n = grains.len();
         for x in &mut grains.place[..n] {
             let wrapped = domain.wrap(crate::grains::vector(x));
             (x[0], x[1], x[2]) = (wrapped.x, wrapped.y, wrapped.z);
         }
-        self.grid = Grid::lay(grains, domain, 2.0 * largest_radius + skin);
-        self.sort(grains);
+        self.sort(grains, domain, skin);
         self.lay_rows(grains);
         self.find_pairs(grains, domain, skin, parallel);
         self.age = 0.0;
     }
 
     /// Whether some pair outside the list may have come closer than the skin.
-    pub fn outdated(&self, skin: f64) -> bool {
-        outdated(&self.row_pairs, &self.rows, &self.travel, self.age, skin)
-    }
-
-    /// The same question for a shorter list that was made later from this one.
-    pub fn outdated_since(&self, travel: &[f64], age: f64, skin: f64) -> bool {
-        outdated(&self.row_pairs, &self.rows, travel, age, skin)
+    pub fn outdated(&mut self, skin: f64) -> bool {
+        let (rows, allowance) = (&self.rows, &mut self.allowance);
+        self.watch
+            .outdated(rows, &self.travel, self.age, skin, allowance)
     }
 
     /// Partners j > i of grain i.
@@ -182,27 +123,79 @@ impl Neighbours {
         self.build.new_index[old as usize]
     }
 
-    /// Number of cells along each axis; with the rows it restores the list's bookkeeping.
-    pub fn cells(&self) -> [usize; 3] {
-        self.grid.cells
+    /// Rows of a level.
+    pub fn rows_of(&self, level: usize) -> Range<usize> {
+        let end = self.levels.get(level + 1);
+        self.levels[level].first_row..end.map_or(self.rows.len(), |l| l.first_row)
     }
 
     /// Lays the bookkeeping of a list that was read back from a checkpoint.
-    pub fn restore(&mut self, cells: [usize; 3], periodic: [bool; 3]) {
-        self.grid.cells = cells;
-        self.grid.periodic = periodic;
-        self.pair_rows();
+    pub fn restore(&mut self, levels: Vec<Level>) {
+        self.levels = levels;
+        self.watch.lay(&self.levels, &self.rows);
+        self.allowance = Allowance::default();
     }
 
-    fn sort(&mut self, grains: &mut Grains) {
+    /// Lays the levels' grids.
+    fn lay_levels(&mut self, grains: &Grains, domain: &Domain, skin: f64) -> Sizes {
+        let place = &grains.place[..grains.len()];
+        let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
+        let (mut smallest, mut largest) = (f64::INFINITY, 0.0_f64);
+        for x in place {
+            for k in 0..3 {
+                low[k] = low[k].min(x[k]);
+                high[k] = high[k].max(x[k]);
+            }
+            (smallest, largest) = (smallest.min(x[3]), largest.max(x[3]));
+        }
+        let mut sizes = Sizes {
+            largest,
+            several: largest >= 2.0 * smallest,
+            level: [0; LEVELS],
+        };
+        let (mut radius, mut count) = ([0.0_f64; LEVELS], [0; LEVELS]);
+        for x in place {
+            let class = sizes.class(x[3]);
+            radius[class] = radius[class].max(x[3]);
+            count[class] += 1;
+        }
+        if place.is_empty() {
+            (radius[0], count[0]) = (1.0, 1);
+        }
+        self.levels.clear();
+        let (mut first_cell, mut first_row) = (0, 0);
+        for class in (0..LEVELS).rev().filter(|&c| count[c] > 0) {
+            let reach = 2.0 * radius[class] + skin;
+            let grid = Grid::lay(count[class], [low, high], domain, reach);
+            sizes.level[class] = self.levels.len();
+            let (cells, rows) = (grid.cells.iter().product::<usize>(), grid.rows());
+            self.levels.push(Level {
+                grid,
+                first_row,
+                radius: radius[class],
+                skin,
+                first_cell,
+                count: cells,
+            });
+            first_cell += cells;
+            first_row += rows;
+        }
+        sizes
+    }
+
+    fn sort(&mut self, grains: &mut Grains, domain: &Domain, skin: f64) {
+        let sizes = self.lay_levels(grains, domain, skin);
         let n = grains.len();
         let b = &mut self.build;
-        let cells = self.grid.cells.iter().product::<usize>();
+        let cells = self.levels.iter().map(|l| l.count).sum::<usize>();
         // Cells first; each is replaced by its grain's new place.
         b.new_index.clear();
         b.new_index.reserve_exact(n);
-        b.new_index
-            .extend(grains.place[..n].iter().map(|x| self.grid.index(x) as u32));
+        for x in &grains.place[..n] {
+            let level = &self.levels[sizes.level[sizes.class(x[3])]];
+            b.new_index
+                .push((level.first_cell + level.grid.index(x)) as u32);
+        }
         b.cell_first.clear();
         // Counted two places on: filling moves each cell's start to its end, one place on.
         b.cell_first.resize(cells + 2, 0);
@@ -225,47 +218,57 @@ impl Neighbours {
     }
 
     fn lay_rows(&mut self, grains: &Grains) {
-        let [nx, ny, nz] = self.grid.cells;
         self.rows.clear();
-        for row in 0..ny * nz {
-            let start = self.build.cell_first[row * nx];
-            let end = self.build.cell_first[(row + 1) * nx];
-            let mut drift = [0.0; 3];
-            for v in &grains.motion[start as usize..end as usize] {
-                for k in 0..3 {
-                    drift[k] += v[k];
+        for level in &self.levels {
+            let nx = level.grid.cells[0];
+            for row in 0..level.grid.rows() {
+                let cell = level.first_cell + row * nx;
+                let start = self.build.cell_first[cell];
+                let end = self.build.cell_first[cell + nx];
+                let mut drift = [0.0; 3];
+                for v in &grains.motion[start as usize..end as usize] {
+                    for k in 0..3 {
+                        drift[k] += v[k];
+                    }
                 }
+                if end > start {
+                    drift = drift.map(|d| d / f64::from(end - start));
+                }
+                self.rows.push(Row { start, end, drift });
             }
-            if end > start {
-                drift = drift.map(|d| d / (end - start) as f64);
-            } else if row >= ny {
-                // An empty row links its neighbours in the chain of the bound: any value is right,
-                // a value like theirs is tight.
-                drift = self.rows[row - ny].drift;
-            }
-            self.rows.push(Row { start, end, drift });
         }
+        self.drift_of_empty_rows();
         self.travel.clear();
         self.travel.resize(self.rows.len(), 0.0);
-        self.pair_rows();
+        self.watch.lay(&self.levels, &self.rows);
+        self.allowance = Allowance::default();
     }
 
-    fn pair_rows(&mut self) {
-        let [_, ny, nz] = self.grid.cells;
-        self.row_pairs.clear();
-        let (mut ys, mut zs) = (Vec::new(), Vec::new());
-        for z in 0..nz {
-            for y in 0..ny {
-                let a = z * ny + y;
-                self.grid.around(2, z, 2, &mut zs);
-                self.grid.around(1, y, 2, &mut ys);
-                for &zb in &zs {
-                    for &yb in &ys {
-                        let b = zb * ny + yb;
-                        if b >= a {
-                            self.row_pairs.push((a as u32, b as u32));
-                        }
+    /// An empty row links its neighbours in the chain of the bound: any value is right, a value like
+    /// theirs is tight. It is that of the finest grains in its place, or of the row before.
+    fn drift_of_empty_rows(&mut self) {
+        for l in 0..self.levels.len() {
+            let (level, finest) = (&self.levels[l], &self.levels[0]);
+            let layer = level.grid.cells[level.grid.across[0]];
+            for row in 0..level.grid.rows() {
+                let at = level.first_row + row;
+                if !self.rows[at].is_empty() {
+                    continue;
+                }
+                if l > 0 {
+                    let cells = level.grid.row(row);
+                    let mut center = [0; 3];
+                    for (axis, cell) in level.grid.across.into_iter().zip(cells) {
+                        let grid = &level.grid;
+                        let x = grid.origin[axis] + (cell as f64 + 0.5) / grid.inverse_cell[axis];
+                        center[axis] = finest.grid.coordinate(axis, x);
                     }
+                    let fine = finest
+                        .grid
+                        .row_at(finest.grid.across.map(|axis| center[axis]));
+                    self.rows[at].drift = self.rows[fine].drift;
+                } else if row >= layer {
+                    self.rows[at].drift = self.rows[at - layer].drift;
                 }
             }
         }
@@ -284,8 +287,13 @@ impl Neighbours {
         self.first.clear();
         self.first.push(0);
         self.partner.clear();
-        let (grid, first) = (&self.grid, &self.build.cell_first);
-        let search = |part: &mut Part| search_rows(part, grid, first, grains, domain, skin);
+        let finder = Finder {
+            levels: &self.levels,
+            first: &self.build.cell_first,
+            grains,
+            images: Images::of(domain),
+            skin,
+        };
         let mut total = 0;
         for group in (0..rows).step_by(ROWS_A_PART * parts.len()) {
             for (p, part) in parts.iter_mut().enumerate() {
@@ -293,9 +301,9 @@ impl Neighbours {
                 part.rows = from..(from + ROWS_A_PART).min(rows);
             }
             if threads > 1 {
-                parts.par_iter_mut().for_each(search);
+                parts.par_iter_mut().for_each(|part| finder.search(part));
             } else {
-                parts.iter_mut().for_each(search);
+                parts.iter_mut().for_each(|part| finder.search(part));
             }
             for part in &parts {
                 for &count in &part.counts {
@@ -309,60 +317,121 @@ impl Neighbours {
     }
 }
 
-fn outdated(pairs: &[(u32, u32)], rows: &[Row], travel: &[f64], age: f64, skin: f64) -> bool {
-    pairs.iter().any(|&(a, b)| {
-        let (ra, rb) = (&rows[a as usize], &rows[b as usize]);
-        let d: [f64; 3] = std::array::from_fn(|k| ra.drift[k] - rb.drift[k]);
-        let apart = (d[0] * d[0] + d[1] * d[1] + d[2] * d[2]).sqrt() * age;
-        let approach = travel[a as usize] + travel[b as usize] + apart;
-        approach > skin || approach.is_nan()
-    })
+/// Classes of size: class c holds radii between `largest/2^(c+1)` and `largest/2^c`.
+struct Sizes {
+    largest: f64,
+    several: bool,
+    /// The level of each class that has grains.
+    level: [usize; LEVELS],
 }
 
-fn search_rows(
-    part: &mut Part,
-    grid: &Grid,
-    first: &[u32],
-    grains: &Grains,
-    domain: &Domain,
+impl Sizes {
+    fn class(&self, radius: f64) -> usize {
+        if self.several {
+            ((self.largest / radius).log2() as usize).min(LEVELS - 1)
+        } else {
+            0
+        }
+    }
+}
+
+/// What a search reads.
+struct Finder<'a> {
+    levels: &'a [Level],
+    first: &'a [u32],
+    grains: &'a Grains,
+    images: Images,
     skin: f64,
-) {
-    let [nx, ny, _] = grid.cells;
-    let images = Images::of(domain);
-    part.counts.clear();
-    part.partner.clear();
-    let [xs, ys, zs] = &mut part.scratch;
-    for row in part.rows.clone() {
-        grid.around(1, row % ny, 1, ys);
-        grid.around(2, row / ny, 1, zs);
-        for x in 0..nx {
-            grid.around(0, x, 1, xs);
-            let cell = row * nx + x;
-            for i in first[cell]..first[cell + 1] {
-                let before = part.partner.len();
-                let xi = &grains.place[i as usize];
-                let reach = xi[3] + skin;
-                let held = grains.motion[i as usize][3] == 0.0;
-                for &z in zs.iter() {
-                    for &y in ys.iter() {
-                        for &xc in xs.iter() {
-                            let other = (z * ny + y) * nx + xc;
-                            let from = first[other].max(i + 1);
-                            for j in from..first[other + 1].max(from) {
-                                let xj = &grains.place[j as usize];
-                                let r2 = images.distance_squared(xi, xj);
-                                let near = reach + xj[3];
-                                // Two fixed grains have nothing to say to each other.
-                                let idle = held && grains.motion[j as usize][3] == 0.0;
-                                if r2 < near * near && !idle {
-                                    part.partner.push(j);
-                                }
-                            }
+}
+
+impl Finder<'_> {
+    fn search(&self, part: &mut Part) {
+        part.counts.clear();
+        part.partner.clear();
+        for row in part.rows.clone() {
+            let l = self.levels.partition_point(|l| l.first_row <= row) - 1;
+            let level = &self.levels[l];
+            let across = level.grid.row(row - level.first_row);
+            level.around_row(across, &mut part.around);
+            let nx = level.grid.cells[0];
+            let cell = level.first_cell + (row - level.first_row) * nx;
+            for x in 0..nx {
+                level.grid.around(0, [x, x], 1, &mut part.around[0]);
+                for i in self.first[cell + x]..self.first[cell + x + 1] {
+                    let before = part.partner.len();
+                    self.scan(level, i, &part.around, &mut part.partner);
+                    if l + 1 < self.levels.len() {
+                        self.scan_coarser(l, i, part);
+                        let at = &self.grains.place[i as usize];
+                        // The cells of its own level are needed again.
+                        level.around_row(across, &mut part.around);
+                        let x = level.grid.coordinate(0, at[0]);
+                        level.grid.around(0, [x, x], 1, &mut part.around[0]);
+                    }
+                    part.counts.push((part.partner.len() - before) as u32);
+                }
+            }
+        }
+    }
+
+    fn scan_coarser(&self, l: usize, i: u32, part: &mut Part) {
+        let at = &self.grains.place[i as usize];
+        for coarse in &self.levels[l + 1..] {
+            let grid = &coarse.grid;
+            let across = grid.across.map(|axis| grid.coordinate(axis, at[axis]));
+            coarse.around_row(across, &mut part.around);
+            let x = grid.coordinate(0, at[0]);
+            grid.around(0, [x, x], 1, &mut part.around[0]);
+            self.scan(coarse, i, &part.around, &mut part.partner);
+        }
+    }
+
+    /// Lists the grains behind i in cells of a level.
+    fn scan(&self, level: &Level, i: u32, around: &[Vec<usize>; 3], partner: &mut Vec<u32>) {
+        let grains = self.grains;
+        let xi = &grains.place[i as usize];
+        let reach = xi[3] + self.skin;
+        let held = grains.motion[i as usize][3] == 0.0;
+        let nx = level.grid.cells[0];
+        for &slow in &around[2] {
+            for &fast in &around[1] {
+                let row = level.first_cell + level.grid.row_at([fast, slow]) * nx;
+                for &x in &around[0] {
+                    let from = self.first[row + x].max(i + 1);
+                    for j in from..self.first[row + x + 1].max(from) {
+                        let xj = &grains.place[j as usize];
+                        let r2 = self.images.distance_squared(xi, xj);
+                        let near = reach + xj[3];
+                        // Two fixed grains have nothing to say to each other.
+                        let idle = held && grains.motion[j as usize][3] == 0.0;
+                        if r2 < near * near && !idle {
+                            partner.push(j);
                         }
                     }
                 }
-                part.counts.push((part.partner.len() - before) as u32);
             }
         }
+    }
+}
+
+impl Level {
+    /// A level as a checkpoint has it.
+    pub fn restored(grid: Grid, first_row: usize, radius: f64, skin: f64) -> Self {
+        Level {
+            grid,
+            first_row,
+            radius,
+            skin,
+            ..Level::default()
+        }
+    }
+
+    /// Cells up to one away across the row with these cell numbers.
+    fn around_row(&self, [fast, slow]: [usize; 2], around: &mut [Vec<usize>; 3]) {
+        let [across_fast, across_slow] = self.grid.across;
+        self.grid
+            .around(across_fast, [fast, fast], 1, &mut around[1]);
+        self.grid
+            .around(across_slow, [slow, slow], 1, &mut around[2]);
     }
 }

@@ -12,6 +12,7 @@ use crate::contacts::Touching;
 use crate::domain::Images;
 use crate::grains::Grains;
 use crate::neighbours::Neighbours;
+use crate::validity::Allowance;
 use rayon::prelude::*;
 use std::ops::Range;
 
@@ -127,6 +128,7 @@ pub(crate) struct Reach {
     pub travel: Vec<f64>,
     /// Time since then (s).
     pub age: f64,
+    pub allowance: Allowance,
     incoming: Vec<Import>,
 }
 
@@ -168,6 +170,7 @@ impl Reach {
             steps: 0,
             travel: Vec::new(),
             age: 0.0,
+            allowance: Allowance::default(),
             incoming: Vec::new(),
         }
     }
@@ -189,6 +192,13 @@ impl Reach {
             .clamp(least, most);
     }
 
+    /// Whether a pair outside the list may have come to touch.
+    pub fn outdated(&mut self, list: &Neighbours) -> bool {
+        let (travel, allowance) = (&self.travel, &mut self.allowance);
+        list.watch
+            .outdated(&list.rows, travel, self.age, self.skin, allowance)
+    }
+
     /// Cuts the rows into chunks of about equal work and deals out the histories.
     pub fn cut(&mut self, making: &Making, touching: &Touching, parallel: bool) {
         let (rows, first) = (&making.list.rows, &making.list.first);
@@ -205,19 +215,35 @@ impl Reach {
         };
         // Moving a grain costs about as much as the pairs of the Verlet list it has.
         let work = |g: usize| u64::from(first[g]) + 4 * g as u64;
-        self.chunks.resize_with(pieces, Chunk::default);
-        let mut row = 0;
-        for (p, chunk) in self.chunks.iter_mut().enumerate() {
-            let share = work(n) * (p as u64 + 1) / pieces as u64;
-            let end = if p + 1 == pieces {
-                rows.len()
-            } else {
-                row + rows[row..].partition_point(|r| work(r.end as usize) <= share)
-            };
-            let grain = |row: usize| rows.get(row).map_or(n, |r| r.start as usize);
-            (chunk.rows, chunk.grains) = (row..end, grain(row)..grain(end));
-            row = end;
+        let start = |row: usize| rows.get(row).map_or(n, |r| r.start as usize);
+        let mut used = 0;
+        // Levels are cut apart: between them slots would have to wait for too long.
+        for level in 0..making.list.levels.len() {
+            let range = making.list.rows_of(level);
+            let (from, to) = (start(range.start), start(range.end));
+            if from == to && used > 0 {
+                continue;
+            }
+            let pieces = ((to - from) * pieces).div_ceil(n.max(1)).max(1);
+            let mut row = range.start;
+            for p in 1..=pieces as u64 {
+                let share = work(from) + (work(to) - work(from)) * p / pieces as u64;
+                let end = if p == pieces as u64 {
+                    range.end
+                } else {
+                    let rest = &rows[row..range.end];
+                    row + rest.partition_point(|r| work(r.end as usize) <= share)
+                };
+                if used == self.chunks.len() {
+                    self.chunks.push(Chunk::default());
+                }
+                let chunk = &mut self.chunks[used];
+                (chunk.rows, chunk.grains) = (row..end, start(row)..start(end));
+                row = end;
+                used += 1;
+            }
         }
+        self.chunks.truncate(used);
         let skin = self.skin;
         let deal = |chunk: &mut Chunk| chunk.take_up(touching, making, skin);
         if self.chunks.len() > 1 {
@@ -280,6 +306,7 @@ impl Reach {
         self.travel.resize(making.list.rows.len(), 0.0);
         self.age = 0.0;
         self.steps = 0;
+        self.allowance = Allowance::default();
     }
 
     /// Shows the histories of all touching contacts, ordered by i: `see(i, j, history)`.

@@ -122,12 +122,11 @@ pub struct Simulation {
     pub(crate) law: Arc<LawTable>,
     pub(crate) layout: Layout,
     /// Largest gap that any established contact holds across (m).
-    hold: f64,
+    pub(crate) hold: f64,
     pub(crate) planes: Vec<Plane>,
     pub(crate) timestep: f64,
     parallel: bool,
-    skin: f64,
-    largest_radius: f64,
+    pub(crate) skin: f64,
     pub(crate) grains: Grains,
     pub(crate) list: Neighbours,
     pub(crate) reach: Reach,
@@ -186,7 +185,6 @@ impl Simulation {
             timestep: setup.timestep,
             parallel: setup.threads == Threads::Rayon,
             skin,
-            largest_radius,
             grains: Grains::new(&setup.grains),
             list: Neighbours::default(),
             reach: Reach::new(skin / SKIN),
@@ -353,11 +351,19 @@ impl Simulation {
         self.list.age += self.timestep;
         self.reach.age += self.timestep;
         self.reach.steps += 1;
+        let (dt, mut farthest) = (self.timestep, 0.0);
         for (r, fastest) in self.fastest.iter().enumerate() {
-            let travel = self.timestep * fastest.sqrt();
+            let travel = dt * fastest.sqrt();
             self.list.travel[r] += travel;
             self.reach.travel[r] += travel;
+            // Not a number stays.
+            if travel > farthest || travel.is_nan() {
+                farthest = travel;
+            }
         }
+        let list = &mut self.list;
+        list.watch.spend(&mut list.allowance, farthest, dt);
+        list.watch.spend(&mut self.reach.allowance, farthest, dt);
     }
 
     /// Renews the lists where grains may have outrun them.
@@ -366,6 +372,7 @@ impl Simulation {
         let walls = self
             .plane_contacts
             .outdated(&self.planes, &list.rows, &list.travel, list.age);
+        let list = &mut self.list;
         if walls || list.outdated(self.skin) {
             self.check()?;
             // A list that does not outlive one step cannot promise that no contact was missed.
@@ -377,7 +384,7 @@ impl Simulation {
                 });
             }
             self.rebuild();
-        } else if list.outdated_since(&self.reach.travel, self.reach.age, self.reach.skin) {
+        } else if self.reach.outdated(&self.list) {
             self.make_reach(false);
         }
         Ok(())
@@ -406,16 +413,11 @@ impl Simulation {
 
     fn rebuild(&mut self) {
         self.fold_impulses();
-        self.list.build(
-            &mut self.grains,
-            &self.domain,
-            self.largest_radius,
-            self.skin + self.hold,
-            self.parallel,
-        );
+        let listed = self.skin + self.hold;
+        self.list
+            .build(&mut self.grains, &self.domain, listed, self.parallel);
         let (list, touching) = (&self.list, &mut self.touching);
         let (width, flips) = (self.layout.history, self.layout.flips);
-        let listed = self.skin + self.hold;
         touching.open(width, self.grains.len(), &mut self.grains.next);
         self.reach.compact(width);
         self.reach.compacted(width, |i, j, _| {
