@@ -7,6 +7,7 @@
 use crate::contact::HISTORY_MAX;
 use crate::grains::{Grains, Next};
 use crate::grid::Grid;
+use crate::ledger::EnergyLedger;
 use crate::neighbours::{Level, Row};
 use crate::planes::PlaneContact;
 use crate::record::Record;
@@ -66,6 +67,8 @@ impl Simulation {
         numbers("wall_impulse", self.impulse.to_vec());
         numbers("momentum_account", self.account.iter().copied().collect());
         numbers("largest_overlap", vec![self.deepest]);
+        let ledger = self.ledger.map(|ledger| ledger.numbers());
+        numbers("energy_ledger", ledger.unwrap_or_default());
         numbers("gravity", self.gravity.iter().copied().collect());
         let mut counts = |name: &str, values: Vec<u64>| {
             record.counts.insert(name.into(), values);
@@ -246,6 +249,7 @@ impl Simulation {
         self.impulse.copy_from_slice(sized("wall_impulse", 3)?);
         self.account = Vector3::from_column_slice(sized("momentum_account", 3)?);
         self.deepest = sized("largest_overlap", 1)?[0];
+        self.ledger = EnergyLedger::from_numbers(record.numbers("energy_ledger")?)?;
         self.gravity = Vector3::from_column_slice(sized("gravity", 3)?);
         let &[steps, since_start, springs_current] = record.counts("steps")? else {
             return Err("array `steps` must have 3 numbers".into());

@@ -17,6 +17,7 @@ mod forces;
 mod grains;
 mod grid;
 mod lanes;
+mod ledger;
 mod motion;
 mod neighbours;
 mod observe;
@@ -40,6 +41,7 @@ pub use contact::{
 pub use domain::Domain;
 pub use energy::Energy;
 pub use grains::Grain;
+pub use ledger::{Channels, EnergyLedger};
 pub use planes::Plane;
 pub use record::Record;
 pub use setup::{Setup, SetupError, Threads};

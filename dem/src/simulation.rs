@@ -6,6 +6,7 @@ use crate::contacts::Touching;
 use crate::domain::{Domain, Images};
 use crate::forces::{self, Field};
 use crate::grains::Grains;
+use crate::ledger::EnergyLedger;
 use crate::motion::Motion;
 use crate::neighbours::Neighbours;
 use crate::planes::{Plane, PlaneContacts};
@@ -155,6 +156,7 @@ pub struct Simulation {
     /// Steps since velocities were last given: the first kick after that is half a step.
     pub(crate) steps_since_start: u64,
     pub(crate) deepest: f64,
+    pub(crate) ledger: Option<EnergyLedger>,
     rebuilds: u64,
 }
 
@@ -202,6 +204,7 @@ impl Simulation {
             steps: 0,
             steps_since_start: 0,
             deepest: 0.0,
+            ledger: None,
             rebuilds: 0,
         })
     }
@@ -225,6 +228,10 @@ impl Simulation {
     fn step(&mut self) -> Result<(), Diverged> {
         let started = self.steps_since_start > 0;
         let kick = if started { 1.0 } else { 0.5 } * self.timestep;
+        if self.ledger.is_some() {
+            self.evaluate_forces();
+            self.book_energy(kick);
+        }
         self.pass(
             if self.current {
                 Pass::Motion
@@ -539,6 +546,9 @@ impl Simulation {
     fn open_account(&mut self) {
         self.weigh();
         self.account = self.leapfrog_momentum() + self.wall_impulse();
+        if self.ledger.is_some() {
+            self.open_energy_ledger();
+        }
     }
 
     /// Notes the mass that gravity acts on.

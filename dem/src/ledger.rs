@@ -1,0 +1,295 @@
+//! Where energy comes from and where it goes.
+//!
+//! Leap-frog changes the kinetic energy of a grain by exactly the force times the mean of its velocities
+//! before and after the kick. Booked with that velocity, the work of all contacts, of gravity and of
+//! moved grains adds up to the kinetic energy *to round-off*, at any time step:
+//!
+//! ```text
+//! K(now) = K(start) + Σ W_channel + W_gravity + W_drive
+//! dissipated by a channel = -W_channel - (E_channel(now) - E_channel(start))
+//! ```
+//! E_channel is the energy that the law says its springs hold, so a channel that dissipates less than
+//! nothing shows a law that creates energy, or a step too long for it. The normal channel also loses
+//! what adhesive contacts lose when they are made and broken.
+
+use crate::contact::Stored;
+use crate::grains::{SPHERE_INERTIA, vector};
+use crate::motion;
+use crate::planes::Plane;
+use crate::simulation::Simulation;
+use nalgebra::Vector3;
+use serde::{Deserialize, Serialize};
+
+/// Energy by the channels of a contact law (J).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Channels {
+    /// Normal springs, dashpots, adhesion and cohesion.
+    pub normal: f64,
+    /// Tangential springs, dashpots and friction.
+    pub tangential: f64,
+    /// Rolling.
+    pub rolling: f64,
+    /// Twisting.
+    pub twisting: f64,
+}
+
+impl Channels {
+    /// Over all channels.
+    pub fn sum(&self) -> f64 {
+        self.normal + self.tangential + self.rolling + self.twisting
+    }
+
+    fn of(stored: &Stored) -> Channels {
+        Channels {
+            normal: stored.normal + stored.cohesion,
+            tangential: stored.tangential,
+            rolling: stored.rolling,
+            twisting: stored.twisting,
+        }
+    }
+}
+
+/// What has happened to the energy of the free grains since the ledger was opened (J).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct EnergyLedger {
+    /// Kinetic energy when it was opened.
+    pub kinetic_before: f64,
+    /// Kinetic energy now.
+    pub kinetic: f64,
+    /// Work of contacts on grains.
+    pub work: Channels,
+    /// Work of gravity.
+    pub gravity: f64,
+    /// Work put in by grains that move as they are told.
+    pub drive: f64,
+    /// Energy in contacts when it was opened.
+    pub stored_before: Channels,
+    /// Energy in contacts now.
+    pub stored: Channels,
+}
+
+impl EnergyLedger {
+    /// What contacts have turned into heat, by channel (J).
+    pub fn dissipated(&self) -> Channels {
+        let lost = |work: f64, before: f64, now: f64| -work - (now - before);
+        let (w, b, s) = (&self.work, &self.stored_before, &self.stored);
+        Channels {
+            normal: lost(w.normal, b.normal, s.normal),
+            tangential: lost(w.tangential, b.tangential, s.tangential),
+            rolling: lost(w.rolling, b.rolling, s.rolling),
+            twisting: lost(w.twisting, b.twisting, s.twisting),
+        }
+    }
+
+    /// What is not accounted for, relative to the largest entry: round-off.
+    pub fn error(&self) -> f64 {
+        let put_in = self.work.sum() + self.gravity + self.drive;
+        let entries = [
+            self.kinetic_before,
+            self.kinetic,
+            self.work.sum(),
+            self.work.normal,
+            self.work.tangential,
+            self.gravity,
+            self.drive,
+        ];
+        let scale = entries.iter().fold(0.0_f64, |a, e| a.max(e.abs()));
+        if scale > 0.0 {
+            (self.kinetic - self.kinetic_before - put_in).abs() / scale
+        } else {
+            0.0
+        }
+    }
+}
+
+impl EnergyLedger {
+    /// All entries, for a checkpoint.
+    pub(crate) fn numbers(&self) -> Vec<f64> {
+        let channels = |c: &Channels| [c.normal, c.tangential, c.rolling, c.twisting];
+        let single = [self.kinetic_before, self.kinetic, self.gravity, self.drive];
+        [
+            single,
+            channels(&self.work),
+            channels(&self.stored_before),
+            channels(&self.stored),
+        ]
+        .concat()
+    }
+
+    /// The ledger of a checkpoint; none where it was not open.
+    pub(crate) fn from_numbers(numbers: &[f64]) -> Result<Option<EnergyLedger>, String> {
+        let &[kinetic_before, kinetic, gravity, drive, ref rest @ ..] = numbers else {
+            return match numbers {
+                [] => Ok(None),
+                _ => Err("array `energy_ledger` is too short".into()),
+            };
+        };
+        let [work, stored_before, stored] = rest.as_chunks::<4>().0 else {
+            return Err("array `energy_ledger` must have 16 numbers".into());
+        };
+        let channels = |&[normal, tangential, rolling, twisting]: &[f64; 4]| Channels {
+            normal,
+            tangential,
+            rolling,
+            twisting,
+        };
+        Ok(Some(EnergyLedger {
+            kinetic_before,
+            kinetic,
+            work: channels(work),
+            gravity,
+            drive,
+            stored_before: channels(stored_before),
+            stored: channels(stored),
+        }))
+    }
+}
+
+/// What one side of a contact moves with while it is kicked.
+struct Moving {
+    velocity: Vector3<f64>,
+    /// R ω (m/s).
+    turn: Vector3<f64>,
+    spin: Vector3<f64>,
+    fixed: bool,
+}
+
+impl Simulation {
+    /// Books energies from now on; steps then cost several times as much. Giving velocities, fixing,
+    /// inserting and removing grains opens the ledger anew.
+    pub fn open_energy_ledger(&mut self) {
+        let kinetic = self.energy().kinetic();
+        let stored = self.stored_energy();
+        self.ledger = Some(EnergyLedger {
+            kinetic_before: kinetic,
+            kinetic,
+            stored_before: Channels::of(&stored),
+            stored: Channels::of(&stored),
+            ..EnergyLedger::default()
+        });
+        if self.steps_since_start > 0 {
+            // The next kick begins half a step back: what it does before now is not this ledger's.
+            self.book_energy(-0.5 * self.timestep);
+        }
+    }
+
+    /// The ledger, if it is open.
+    ///
+    /// Energies are those of this instant: the half kick that brings velocities here is booked too, in
+    /// the copy that is handed out.
+    pub fn energy_ledger(&mut self) -> Option<EnergyLedger> {
+        let before = self.ledger?;
+        let stored = self.stored_energy();
+        if self.steps_since_start > 0 {
+            self.book_energy(0.5 * self.timestep);
+        }
+        let mut ledger = std::mem::replace(&mut self.ledger, Some(before))?;
+        ledger.kinetic = self.energy().kinetic();
+        ledger.stored = Channels::of(&stored);
+        Some(ledger)
+    }
+
+    fn stored_energy(&mut self) -> Stored {
+        let energy = self.energy();
+        Stored {
+            normal: energy.normal,
+            cohesion: energy.cohesion,
+            tangential: energy.tangential,
+            rolling: energy.rolling,
+            twisting: energy.twisting,
+        }
+    }
+
+    /// The mean of a grain's velocities before and after a kick of this length.
+    fn moving(&self, i: usize, kick: f64) -> Moving {
+        let (v, s) = (&self.grains.motion[i], &self.grains.turn[i]);
+        let mut velocity = vector(v);
+        let mut turn = vector(s);
+        let fixed = self.grains.is_fixed(i);
+        if !fixed {
+            let [force, torque, moment] =
+                motion::gather(&self.reach, &self.plane_contacts, self.slot_rows(), i);
+            velocity += 0.5 * kick * (vector(&force) * v[3] + self.gravity);
+            turn += 0.5 * kick / SPHERE_INERTIA * v[3] * (vector(&torque) + vector(&moment) * s[3]);
+        }
+        Moving {
+            velocity,
+            turn,
+            spin: turn * s[3],
+            fixed,
+        }
+    }
+
+    /// Books a kick from the velocities half a step back (one of negative length takes it off again);
+    /// forces of the present positions are in the slots.
+    pub(crate) fn book_energy(&mut self, kick: f64) {
+        let Some(mut ledger) = self.ledger else {
+            return;
+        };
+        let rows = self.slot_rows();
+        let moving: Vec<Moving> = (0..self.grains.len())
+            .map(|i| self.moving(i, kick.abs()))
+            .collect();
+        for (m, grain) in moving
+            .iter()
+            .enumerate()
+            .map(|(i, m)| (self.grains.mass[i], m))
+        {
+            if !grain.fixed {
+                ledger.gravity += kick * m * grain.velocity.dot(&self.gravity);
+            }
+        }
+        for (chunk, k) in self.reach.pairs() {
+            let (i, j) = (chunk.i[k] as usize, chunk.j[k] as usize);
+            let slot = &chunk.slots[k * rows..][..rows];
+            if slot.iter().flatten().all(|x| *x == 0.0) {
+                continue;
+            }
+            let (a, b) = (&self.grains.place[i], &self.grains.place[j]);
+            let normal = self.domain.nearest_image(vector(a) - vector(b)).normalize();
+            let (a, b) = (&moving[i], &moving[j]);
+            let (u, turns, spin) = (a.velocity - b.velocity, a.turn + b.turn, a.spin - b.spin);
+            book(&mut ledger.work, slot, &normal, kick, [u, turns, spin]);
+            // Work on a fixed grain is not work on a free one: somebody moved it.
+            for (side, sign) in [(a, 1.0), (b, -1.0)] {
+                if side.fixed {
+                    let power = sign * vector(&slot[0]).dot(&side.velocity)
+                        + vector(&slot[1]).dot(&side.turn)
+                        + slot
+                            .get(2)
+                            .map_or(0.0, |m| sign * vector(m).dot(&side.spin));
+                    ledger.drive -= kick * power;
+                }
+            }
+        }
+        for contact in &self.plane_contacts.contacts {
+            let grain = &moving[contact.grain as usize];
+            let Plane { normal, .. } = &self.planes[contact.plane as usize];
+            if !grain.fixed {
+                let against = [grain.velocity, grain.turn, grain.spin];
+                book(&mut ledger.work, &contact.slot, normal, kick, against);
+            }
+        }
+        self.ledger = Some(ledger);
+    }
+}
+
+/// Work of one contact on both sides: relative velocity, sum of R ω, difference of ω.
+fn book(
+    work: &mut Channels,
+    slot: &[[f64; 4]],
+    normal: &Vector3<f64>,
+    kick: f64,
+    [velocity, turns, spin]: [Vector3<f64>; 3],
+) {
+    let force = vector(&slot[0]);
+    let pressing = force.dot(normal) * velocity.dot(normal);
+    work.normal += kick * pressing;
+    work.tangential += kick * (force.dot(&velocity) - pressing + vector(&slot[1]).dot(&turns));
+    if let Some(moment) = slot.get(2) {
+        let moment = vector(moment);
+        let twist = moment.dot(normal) * spin.dot(normal);
+        work.twisting += kick * twist;
+        work.rolling += kick * (moment.dot(&spin) - twist);
+    }
+}
