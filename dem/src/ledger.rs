@@ -183,7 +183,7 @@ impl Simulation {
         if self.steps_since_start > 0 {
             self.book_energy(0.5 * self.timestep);
         }
-        let mut ledger = std::mem::replace(&mut self.ledger, Some(before))?;
+        let mut ledger = self.ledger.replace(before)?;
         ledger.kinetic = self.energy().kinetic();
         ledger.stored = Channels::of(&stored);
         Some(ledger)
