@@ -435,3 +435,146 @@ impl Level {
             .around(across_slow, [slow, slow], 1, &mut around[2]);
     }
 }
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::Grain;
+    use nalgebra::Vector3;
+    use rand::{RngExt, SeedableRng};
+    use rand_chacha::ChaCha8Rng;
+    use std::collections::BTreeSet;
+
+    const SKIN: f64 = 0.3;
+
+    /// Grains anywhere in a box, overlapping or not, radii of a power law from 0.5 to 0.5 `ratio`.
+    fn cloud(seed: u64, n: usize, ratio: f64, periodic: [bool; 3]) -> (Vec<Grain>, Domain) {
+        let mut random = ChaCha8Rng::seed_from_u64(seed);
+        let size = Vector3::new(3.0, 2.5, 4.0) * (2.0 * ratio + 2.0);
+        let grains = (0..n).map(|k| {
+            let mut unit = || random.random::<f64>();
+            // As many grains by volume in each class of size.
+            let u = if k == 0 { 1.0 } else { unit() };
+            let radius = 0.5 * (1.0 - u * (1.0 - ratio.powi(-3))).powf(-1.0 / 3.0);
+            // Dense towards a corner, where all images meet.
+            let at = Vector3::new(unit(), unit(), unit()).map(|x| x.powi(3));
+            let at = at.component_mul(&size);
+            let mut grain = Grain::at_rest(at, radius, 1.0);
+            let noise = Vector3::new(unit(), unit(), unit()) - Vector3::repeat(0.5);
+            grain.velocity = 0.2 * noise + Vector3::new(0.5 * at.z, 0.0, 0.1 * at.x);
+            grain.fixed = unit() < 0.05;
+            if grain.fixed {
+                grain.velocity = Vector3::zeros();
+            }
+            grain
+        });
+        let grains = grains.collect();
+        let domain = Domain {
+            lower: Vector3::zeros(),
+            upper: size,
+            periodic,
+        };
+        (grains, domain)
+    }
+
+    /// All pairs closer than a contact plus `gap`, by trying every one.
+    fn close(grains: &Grains, domain: &Domain, gap: f64) -> BTreeSet<(u32, u32)> {
+        let images = Images::of(domain);
+        let mut pairs = BTreeSet::new();
+        for i in 0..grains.len() {
+            for j in i + 1..grains.len() {
+                let (a, b) = (&grains.place[i], &grains.place[j]);
+                let near = a[3] + b[3] + gap;
+                let idle = grains.is_fixed(i) && grains.is_fixed(j);
+                if images.distance_squared(a, b) < near * near && !idle {
+                    pairs.insert((i as u32, j as u32));
+                }
+            }
+        }
+        pairs
+    }
+
+    fn listed(list: &Neighbours, n: usize) -> BTreeSet<(u32, u32)> {
+        let mut pairs = BTreeSet::new();
+        for i in 0..n {
+            for &j in list.partners(i) {
+                assert!(j as usize > i);
+                assert!(pairs.insert((i as u32, j)), "listed twice: {i}, {j}");
+            }
+        }
+        pairs
+    }
+
+    #[test]
+    fn every_close_pair_is_listed_once_at_any_ratio_of_sizes() {
+        for (ratio, levels) in [(1.0, 1), (1.9, 1), (5.0, 3), (50.0, 3)] {
+            for periodic in [[false; 3], [true, true, false], [true; 3]] {
+                let (setup, domain) = cloud(3, 1200, ratio, periodic);
+                let mut grains = Grains::new(&setup);
+                let mut list = Neighbours::default();
+                list.build(&mut grains, &domain, SKIN, false);
+                assert!(list.levels.len() >= levels, "{}", list.levels.len());
+                assert!(levels > 1 || list.levels.len() == 1);
+                let expected = close(&grains, &domain, SKIN);
+                assert!(expected.len() > 100, "{}", expected.len());
+                assert_eq!(
+                    listed(&list, grains.len()),
+                    expected,
+                    "{ratio} {periodic:?}"
+                );
+            }
+        }
+    }
+
+    #[test]
+    fn no_pair_comes_to_touch_unlisted_while_the_list_is_said_to_be_valid() {
+        for (ratio, periodic) in [
+            (1.0, [true; 3]),
+            (5.0, [false; 3]),
+            (20.0, [true, true, false]),
+            (50.0, [true; 3]),
+        ] {
+            let (setup, domain) = cloud(7, 900, ratio, periodic);
+            let mut grains = Grains::new(&setup);
+            let mut list = Neighbours::default();
+            let dt = 1e-3 / ratio;
+            let (mut steps, mut builds) = (0, 0);
+            while builds < 4 {
+                list.build(&mut grains, &domain, SKIN, false);
+                builds += 1;
+                let known = listed(&list, grains.len());
+                loop {
+                    let mut farthest = 0.0_f64;
+                    for (travel, row) in list.travel.iter_mut().zip(&list.rows) {
+                        let mut own = 0.0_f64;
+                        for g in row.start as usize..row.end as usize {
+                            let v = grains.motion[g];
+                            for (x, v) in grains.place[g].iter_mut().zip(&v[..3]) {
+                                *x += dt * v;
+                            }
+                            let against = crate::grains::vector(&v) - Vector3::from(row.drift);
+                            own = own.max(dt * against.norm());
+                        }
+                        *travel += own;
+                        farthest = farthest.max(own);
+                    }
+                    list.age += dt;
+                    let list = &mut list;
+                    list.watch.spend(&mut list.allowance, farthest, dt);
+                    if list.outdated(SKIN) {
+                        break;
+                    }
+                    steps += 1;
+                    if steps % 20 == 0 {
+                        let touching = close(&grains, &domain, 0.0);
+                        assert!(touching.is_subset(&known), "{ratio} {periodic:?}");
+                    }
+                }
+            }
+            assert!(
+                steps > 20,
+                "the list must last: {steps} steps at ratio {ratio}"
+            );
+        }
+    }
+}

@@ -33,6 +33,15 @@ pub(crate) struct Watch {
     pairs: Vec<Pair>,
     /// Largest |w_a - w_b| of all pairs (m/s).
     shear: f64,
+    scratch: Scratch,
+}
+
+/// Cell numbers across rows, and rows.
+#[derive(Clone, Debug, Default)]
+struct Scratch {
+    fast: Vec<usize>,
+    slow: Vec<usize>,
+    near: Vec<usize>,
 }
 
 /// By how much grains of any two rows may still approach before the pairs are looked at again (m).
@@ -43,16 +52,16 @@ impl Watch {
     /// Finds the pairs of rows; levels are ordered from fine to coarse.
     pub fn lay(&mut self, levels: &[Level], rows: &[Row]) {
         self.pairs.clear();
-        let (mut fast, mut slow) = (Vec::new(), Vec::new());
+        let mut scratch = std::mem::take(&mut self.scratch);
         for (l, level) in levels.iter().enumerate() {
             for row in 0..level.grid.rows() {
                 let a = (level.first_row + row) as u32;
                 let [m, s] = level.grid.row(row);
                 let [across_m, across_s] = level.grid.across;
-                level.grid.around(across_m, [m, m], 2, &mut fast);
-                level.grid.around(across_s, [s, s], 2, &mut slow);
-                for &s in &slow {
-                    for &m in &fast {
+                level.grid.around(across_m, [m, m], 2, &mut scratch.fast);
+                level.grid.around(across_s, [s, s], 2, &mut scratch.slow);
+                for &s in &scratch.slow {
+                    for &m in &scratch.fast {
                         let b = (level.first_row + level.grid.row_at([m, s])) as u32;
                         if b >= a {
                             self.pairs.push(Pair { a, b, slack: 0.0 });
@@ -63,10 +72,11 @@ impl Watch {
                     continue;
                 }
                 for coarse in &levels[l + 1..] {
-                    self.watch_coarser(level, row, coarse, rows, &mut fast, &mut slow);
+                    self.watch_coarser(level, row, coarse, rows, &mut scratch);
                 }
             }
         }
+        self.scratch = scratch;
         self.shear = 0.0;
         for pair in &self.pairs {
             self.shear = self.shear.max(shear(pair, rows));
@@ -79,9 +89,9 @@ impl Watch {
         row: usize,
         coarse: &Level,
         rows: &[Row],
-        fast: &mut Vec<usize>,
-        slow: &mut Vec<usize>,
+        scratch: &mut Scratch,
     ) {
+        let Scratch { fast, slow, near } = scratch;
         let a = (level.first_row + row) as u32;
         let axes = level.grid.across;
         let cells = level.grid.row(row);
@@ -94,7 +104,7 @@ impl Watch {
         let slack = coarse.grid.width() - level.radius - coarse.radius - coarse.skin;
         coarse.grid.around(across_m, beside[across_m], 1, fast);
         coarse.grid.around(across_s, beside[across_s], 1, slow);
-        let mut near = Vec::new();
+        near.clear();
         for &s in slow.iter() {
             for &m in fast.iter() {
                 near.push(coarse.grid.row_at([m, s]));

@@ -1,0 +1,111 @@
+//! A step allocates nothing; rebuilds only where a buffer has to grow.
+
+#![allow(clippy::unwrap_used)]
+
+use colluvium_dem::preparation::{Bed, InclineBed, RadiusLaw, settle_incline_bed};
+use colluvium_dem::*;
+use nalgebra::Vector3;
+use std::alloc::{GlobalAlloc, Layout, System};
+use std::ops::ControlFlow;
+use std::sync::atomic::{AtomicU64, Ordering};
+
+struct Counting;
+
+static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
+
+// SAFETY: hands everything on to the system's allocator; counting has no effect on memory.
+unsafe impl GlobalAlloc for Counting {
+    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller keeps the contract of `alloc`.
+        unsafe { System.alloc(layout) }
+    }
+    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
+        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
+        // SAFETY: the caller keeps the contract of `realloc`.
+        unsafe { System.realloc(at, layout, size) }
+    }
+    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
+        // SAFETY: the caller keeps the contract of `dealloc`.
+        unsafe { System.dealloc(at, layout) }
+    }
+}
+
+#[global_allocator]
+static COUNTING: Counting = Counting;
+
+fn flow(threads: Threads) -> Simulation {
+    let law = ContactLaw::linear(
+        Hooke::matched(2e4, 0.5),
+        TangentialSpring::matched(2.0 / 7.0, 0.5, 0.5),
+        None,
+    );
+    let spec = InclineBed {
+        grains: 1500,
+        radius: RadiusLaw::Gaussian {
+            mean: 0.5,
+            relative_deviation: 0.1,
+            cut: 1.0,
+        },
+        density: 6.0 / std::f64::consts::PI,
+        length: 12.0,
+        width: 10.0,
+        law,
+        gravity: 1.0,
+        timestep: 5e-4,
+        seed: 5,
+    };
+    let bed: Bed =
+        settle_incline_bed(&spec, Threads::Serial, &mut |_| ControlFlow::Continue(())).unwrap();
+    let slope = 33_f64.to_radians();
+    let mut s = Simulation::new(Setup {
+        domain: bed.domain,
+        gravity: Vector3::new(slope.sin(), 0.0, -slope.cos()),
+        law: law.into(),
+        grains: bed.grains,
+        planes: vec![Plane {
+            point: Vector3::new(0.0, 0.0, bed.domain.lower.z),
+            normal: Vector3::z(),
+            material: 0,
+        }],
+        timestep: 5e-4,
+        threads,
+    })
+    .unwrap();
+    s.give_velocity(|g| Vector3::new(1.2 * g.position.z, 0.0, 0.0));
+    s
+}
+
+/// Allocations of a few steps without a rebuild, and of many with rebuilds.
+fn count(s: &mut Simulation) -> (u64, u64, u64) {
+    s.advance(1500).unwrap();
+    let mut quiet = u64::MAX;
+    // The list of pairs within reach is renewed every few steps: look at single ones.
+    for _ in 0..50 {
+        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        s.advance(1).unwrap();
+        quiet = quiet.min(ALLOCATIONS.load(Ordering::Relaxed) - before);
+    }
+    let (before, builds) = (ALLOCATIONS.load(Ordering::Relaxed), s.list_builds());
+    s.advance(1500).unwrap();
+    let after = ALLOCATIONS.load(Ordering::Relaxed);
+    (quiet, after - before, s.list_builds() - builds)
+}
+
+#[test]
+fn steps_allocate_nothing() {
+    let (quiet, busy, builds) = count(&mut flow(Threads::Serial));
+    println!("serial: {quiet} a step, {busy} over {builds} rebuilds");
+    let mut parallel = flow(Threads::Rayon);
+    let (quiet_threads, busy_threads, _) = rayon::ThreadPoolBuilder::new()
+        .num_threads(2)
+        .build()
+        .unwrap()
+        .install(|| count(&mut parallel));
+    println!("two threads: {quiet_threads} a step, {busy_threads} over the rebuilds");
+    assert!(builds > 3, "{builds}");
+    assert_eq!((quiet, quiet_threads), (0, 0));
+    // A buffer grows now and then, when a list is longer than any before it.
+    assert!(busy < 2 * builds, "{busy}");
+    assert!(busy_threads < 2 * builds, "{busy_threads}");
+}
