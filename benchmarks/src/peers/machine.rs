@@ -45,6 +45,16 @@ pub fn load() -> Option<f64> {
     text.split(' ').next()?.parse().ok()
 }
 
+/// Time all threads of this process have spent on processors (s), where Linux tells.
+pub fn processor_time() -> Option<f64> {
+    let mut sum = 0.0;
+    for task in std::fs::read_dir("/proc/self/task").ok()? {
+        let text = std::fs::read_to_string(task.ok()?.path().join("schedstat")).ok()?;
+        sum += text.split(' ').next()?.parse::<f64>().ok()?;
+    }
+    Some(sum * 1e-9)
+}
+
 /// The value of `key : value`.
 fn value<'a>(text: &'a str, key: &str) -> Option<&'a str> {
     let line = text.lines().find(|l| l.starts_with(key))?;

@@ -1,6 +1,7 @@
 //! Our own side: the case as a `Simulation`, run in a process of its own like the others.
 
 use super::case::{Case, Law};
+use super::machine::processor_time;
 use colluvium_dem::contact::mindlin::SpringMemory;
 use colluvium_dem::contact::{Damping, Elasticity, Mindlin, SpringStiffness, Tangential};
 use colluvium_dem::{
@@ -155,16 +156,6 @@ pub fn run(case: &Case, finer: u64, threads: usize) -> Result<(), OursFailed> {
     };
     println!("loop {} {wall:.6} {cpu}", case.steps * finer);
     Ok(())
-}
-
-/// Time all threads of this process have spent on processors (s), where Linux tells.
-fn processor_time() -> Option<f64> {
-    let mut sum = 0.0;
-    for task in std::fs::read_dir("/proc/self/task").ok()? {
-        let text = std::fs::read_to_string(task.ok()?.path().join("schedstat")).ok()?;
-        sum += text.split(' ').next()?.parse::<f64>().ok()?;
-    }
-    Some(sum * 1e-9)
 }
 
 #[cfg(test)]
