@@ -7,11 +7,14 @@ use super::trace::{Trace, parse_lines};
 use super::{esys, lammps, liggghts, yade};
 use std::fs::{self, File};
 use std::path::Path;
-use std::process::{Command, Stdio};
+use std::process::{Child, Command, Stdio};
 use std::time::{Duration, Instant};
 
 /// The hidden argument under which this program is its own competitor.
 pub const WORKER: &str = "worker";
+
+/// How long a run that is asked to stop may take to do so.
+const PATIENCE: Duration = Duration::from_secs(10);
 
 /// Where a run happens.
 #[derive(Clone, Debug)]
@@ -161,6 +164,21 @@ fn command(found: &Found, case: &Case, place: &Place, finer: u64) -> Result<Comm
     Ok(command)
 }
 
+/// Ends a run. Asked first, and only then forced: mpirun takes its ranks with it only if it is asked.
+fn stop(child: &mut Child) {
+    // It may have ended in between, so none of this can fail in a way that matters.
+    let _ = Command::new("kill").arg(child.id().to_string()).status();
+    let asked = Instant::now();
+    while asked.elapsed() < PATIENCE {
+        if !matches!(child.try_wait(), Ok(None)) {
+            return;
+        }
+        std::thread::sleep(Duration::from_millis(50));
+    }
+    let _ = child.kill();
+    let _ = child.wait();
+}
+
 /// Runs a command to its end, its output in a file; stops it after `limit` seconds.
 fn wait(command: &mut Command, log: &Path, limit: u64) -> Result<(), String> {
     let file = File::create(log).map_err(|e| format!("{}: {e}", log.display()))?;
@@ -179,12 +197,25 @@ fn wait(command: &mut Command, log: &Path, limit: u64) -> Result<(), String> {
             Some(status) if status.success() => return Ok(()),
             Some(status) => return Err(format!("ended with {status}")),
             None if started.elapsed() > Duration::from_secs(limit) => {
-                // It may have ended in between.
-                let _ = child.kill();
-                let _ = child.wait();
+                stop(&mut child);
                 return Err(format!("stopped after {limit} s"));
             }
             None => std::thread::sleep(Duration::from_millis(20)),
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_run_without_end_is_stopped_and_said_so() {
+        let folder = tempfile::tempdir().unwrap();
+        let log = folder.path().join("out.txt");
+        let error = wait(Command::new("sleep").arg("100"), &log, 0).unwrap_err();
+        assert!(error.contains("stopped after 0 s"), "{error}");
+        let error = wait(&mut Command::new("/nonexistent/code"), &log, 1).unwrap_err();
+        assert!(error.contains("cannot start"), "{error}");
     }
 }
