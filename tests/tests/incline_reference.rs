@@ -96,7 +96,7 @@ fn rests_at_24_degrees_and_flows_at_33() {
     let gentle = Start::Flow {
         inertial_number: 0.06,
     };
-    let rest = run(24.0, gentle, Purpose::StopSearch, [20.0, 40.0]);
+    let rest = run(24.0, gentle, Purpose::StopSearch, [20.0, 120.0]);
     assert_eq!(rest.outcome, Outcome::Rest, "{:?}", rest.steady);
     assert!(!rest.flows());
     let flow = run(33.0, gentle, Purpose::StopSearch, [20.0, 30.0]);
