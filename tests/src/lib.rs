@@ -1,5 +1,7 @@
 //! Fixtures shared by the tests across crates: materials, beds, other codes' figures.
 
+pub mod impacts;
+pub mod rebound;
 mod starts;
 
 pub use starts::{StartError, chute_start, read_start, settle_start, settled_start};
