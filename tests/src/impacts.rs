@@ -25,12 +25,7 @@ pub fn floor() -> Plane {
 }
 
 /// Grains in open space without gravity.
-pub fn scene(
-    law: impl Into<Laws>,
-    grains: Vec<Grain>,
-    planes: Vec<Plane>,
-    timestep: f64,
-) -> Setup {
+pub fn scene(law: impl Into<Laws>, grains: Vec<Grain>, planes: Vec<Plane>, timestep: f64) -> Setup {
     Setup {
         domain: open_space(),
         gravity: Vector3::zeros(),

@@ -1,6 +1,7 @@
 //! Fixtures shared by the tests across crates: materials, beds, other codes' figures.
 
 pub mod impacts;
+pub mod laws;
 pub mod rebound;
 mod starts;
 

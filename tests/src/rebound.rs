@@ -105,12 +105,7 @@ pub fn rebound(head: Head, force: impl Fn(f64, f64) -> f64) -> Rebound {
     }
 }
 
-fn runge_kutta(
-    rate: &impl Fn(f64, [f64; 2]) -> [f64; 2],
-    t: f64,
-    s: [f64; 2],
-    h: f64,
-) -> [f64; 2] {
+fn runge_kutta(rate: &impl Fn(f64, [f64; 2]) -> [f64; 2], t: f64, s: [f64; 2], h: f64) -> [f64; 2] {
     let along = |k: [f64; 2], h: f64| [s[0] + h * k[0], s[1] + h * k[1]];
     let k1 = rate(t, s);
     let k2 = rate(t + 0.5 * h, along(k1, 0.5 * h));

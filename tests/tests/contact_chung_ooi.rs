@@ -175,7 +175,11 @@ fn sticking(keeps_force: bool, stiffness_ratio: f64) -> f64 {
     // Units of m, of the peak overlap and of its time: F_n = x^{3/2}, k_t = ratio · 3/2 √x.
     let rate = |[x, v, s, u]: [f64; 4]| {
         let x = x.max(0.0);
-        let softer = if keeps_force && v > 0.0 { 0.5 * s * v / x } else { 0.0 };
+        let softer = if keeps_force && v > 0.0 {
+            0.5 * s * v / x
+        } else {
+            0.0
+        };
         let k = 1.5 * stiffness_ratio * x.sqrt();
         [v, -x.powf(1.5), u - softer, -3.5 * k * s]
     };
@@ -202,7 +206,10 @@ fn test_4_sticking_impacts_follow_their_own_equation() {
         let Tangential::Mindlin(mut mindlin) = law.tangential else {
             unreachable!("these are Mindlin contacts");
         };
-        for (memory, keeps_force) in [(SpringMemory::Energy, true), (SpringMemory::Displacement, false)] {
+        for (memory, keeps_force) in [
+            (SpringMemory::Energy, true),
+            (SpringMemory::Displacement, false),
+        ] {
             mindlin.memory = memory;
             let law = ContactLaw {
                 tangential: Tangential::Mindlin(mindlin),
@@ -214,7 +221,10 @@ fn test_4_sticking_impacts_follow_their_own_equation() {
             let slip = (g.velocity.x - 2.5e-3 * g.spin.y) / 1e-3;
             let ratio = 4.0 * mindlin.effective_shear / hertz(&law).effective_modulus;
             let exact = sticking(keeps_force, ratio);
-            assert!((slip - exact).abs() < 2e-3, "{memory:?}: {slip} instead of {exact}");
+            assert!(
+                (slip - exact).abs() < 2e-3,
+                "{memory:?}: {slip} instead of {exact}"
+            );
             // What the memory is for: no more slip energy out than in.
             assert!(!keeps_force || exact.abs() < 1.0);
         }
@@ -294,7 +304,10 @@ fn tests_7_and_8_two_spheres_with_spin() {
             assert!(momentum.norm() < 1e-13 * (a + b) * v);
             if a == b {
                 let mirror = (p.velocity + q.velocity).norm() + radius * (p.spin - q.spin).norm();
-                assert!(mirror < 1e-12, "equal spheres leave antisymmetrically: {mirror:e}");
+                assert!(
+                    mirror < 1e-12,
+                    "equal spheres leave antisymmetrically: {mirror:e}"
+                );
             }
         }
     }

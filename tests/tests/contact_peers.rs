@@ -60,7 +60,12 @@ fn b_restitution_on_a_plane() {
         let ball = sphere(2.5e-3, 4000.0, [0.0, 0.0, -3.9], [0.0; 3]);
         let impact = collide(&mut on_floor(law, ball, 1e-9));
         // Phase of first touch within a step differs: a part in 1e4 of 13 000 steps a contact.
-        assert_close("restitution", impact.grains[0].velocity.z / 3.9, measured, 3e-4);
+        assert_close(
+            "restitution",
+            impact.grains[0].velocity.z / 3.9,
+            measured,
+            3e-4,
+        );
         assert_close("peak force", impact.force, force, 1.5e-3);
         assert_close("peak overlap", impact.overlap, overlap, 2e-5);
     }
@@ -69,15 +74,60 @@ fn b_restitution_on_a_plane() {
 /// Angle from the normal (degrees); v_t (m/s) and ω (rad/s) out of LAMMPS `mindlin`, `mindlin_rescale`
 /// and LIGGGHTS `history`.
 const OBLIQUE: [(f64, [f64; 2], [f64; 2], [f64; 2]); 9] = [
-    (2.0, [0.131_271_8, 4.836_219], [0.119_329_8, 16.778_229], [0.131_018_3, 5.068_952]),
-    (5.0, [0.309_187_6, 30.719_809], [0.294_127_3, 45.780_052], [0.309_351_6, 30.469_289]),
-    (10.0, [0.462_429_2, 214.798_663], [0.460_650_5, 216.577_441], [0.459_817_5, 216.747_078]),
-    (20.0, [0.821_070_3, 512.808_218], [0.833_518_2, 500.360_330], [0.819_103_6, 513.329_154]),
-    (30.0, [1.334_838_8, 615.161_203], [1.336_745_4, 613.254_635], [1.334_733_5, 613.782_736]),
-    (40.0, [1.962_673_1, 544.198_623], [1.962_673_1, 544.198_623], [1.962_565_8, 543.116_081]),
-    (50.0, [2.530_927_1, 456.646_226], [2.530_927_1, 456.646_226], [2.530_850_1, 455.855_598]),
-    (70.0, [3.421_818_1, 242.983_136], [3.421_818_1, 242.983_136], [3.421_784_8, 242.737_718]),
-    (80.0, [3.717_382_9, 123.367_291], [3.717_382_9, 123.367_291], [3.717_366_8, 123.301_172]),
+    (
+        2.0,
+        [0.131_271_8, 4.836_219],
+        [0.119_329_8, 16.778_229],
+        [0.131_018_3, 5.068_952],
+    ),
+    (
+        5.0,
+        [0.309_187_6, 30.719_809],
+        [0.294_127_3, 45.780_052],
+        [0.309_351_6, 30.469_289],
+    ),
+    (
+        10.0,
+        [0.462_429_2, 214.798_663],
+        [0.460_650_5, 216.577_441],
+        [0.459_817_5, 216.747_078],
+    ),
+    (
+        20.0,
+        [0.821_070_3, 512.808_218],
+        [0.833_518_2, 500.360_330],
+        [0.819_103_6, 513.329_154],
+    ),
+    (
+        30.0,
+        [1.334_838_8, 615.161_203],
+        [1.336_745_4, 613.254_635],
+        [1.334_733_5, 613.782_736],
+    ),
+    (
+        40.0,
+        [1.962_673_1, 544.198_623],
+        [1.962_673_1, 544.198_623],
+        [1.962_565_8, 543.116_081],
+    ),
+    (
+        50.0,
+        [2.530_927_1, 456.646_226],
+        [2.530_927_1, 456.646_226],
+        [2.530_850_1, 455.855_598],
+    ),
+    (
+        70.0,
+        [3.421_818_1, 242.983_136],
+        [3.421_818_1, 242.983_136],
+        [3.421_784_8, 242.737_718],
+    ),
+    (
+        80.0,
+        [3.717_382_9, 123.367_291],
+        [3.717_382_9, 123.367_291],
+        [3.717_366_8, 123.301_172],
+    ),
 ];
 
 fn oblique(law: ContactLaw, degrees: f64) -> [f64; 2] {
@@ -98,7 +148,10 @@ fn c_oblique_impacts() {
         let at_contact = oblique(kept(Lever::ContactPoint), degrees);
         let tolerance = if degrees >= 40.0 { 4e-5 } else { 1.2e-3 };
         assert_close("v_t of LAMMPS", on_radius[0], lammps[0], tolerance);
-        assert!((on_radius[1] - lammps[1]).abs() < 1.0, "{on_radius:?} {lammps:?}");
+        assert!(
+            (on_radius[1] - lammps[1]).abs() < 1.0,
+            "{on_radius:?} {lammps:?}"
+        );
         assert_close("v_t of LIGGGHTS", at_contact[0], liggghts[0], 1e-2);
         let ours = oblique(law, degrees);
         if degrees >= 40.0 {
@@ -108,8 +161,9 @@ fn c_oblique_impacts() {
             assert_close("ω of LIGGGHTS", half, liggghts[1], 1.5e-4);
             assert_close("v_t", ours[0], liggghts[0], 4e-5);
         } else if degrees <= 5.0 {
-            // Sticking contacts: a spring that keeps its displacement while it stiffens returns more than
-            // it took (`contact_ghosts`). LAMMPS' rescaling takes some of that away, ours all of it.
+            // Sticking contacts: a spring that keeps its displacement while it stiffens gains energy that
+            // nobody puts in, and pushes harder. LAMMPS' rescaling takes part of that away, ours all of it
+            // (`contact_chung_ooi` has the exact answer of both).
             assert!(ours[0] < rescaled[0] && rescaled[0] < lammps[0], "{ours:?}");
         } else {
             assert_close("v_t", ours[0], lammps[0], 1.5e-2);
@@ -162,7 +216,11 @@ fn d_a_spinning_sphere_on_a_plane() {
     // normal force; LAMMPS' friction points along the slip for the first tenth of the contact. Both let
     // friction act on |F_n| in the tensile tail, as ours does: the exact answer of all three for a contact
     // that slides throughout is μ ∫|F_n| dt/m = 0.12805 m/s, whatever the spin.
-    let law = with(elastic(ALLOY, ALLOY, 0.5, 0.4), SpringMemory::Energy, Lever::Radius);
+    let law = with(
+        elastic(ALLOY, ALLOY, 0.5, 0.4),
+        SpringMemory::Energy,
+        Lever::Radius,
+    );
     let normal = normal_impact(&law, 4.0 / 3.0 * PI * 1e-3 * 2699.0, 0.1, 0.2);
     assert_close("restitution", normal.speed / 0.2, 0.5, 1e-9);
     let exact = 0.4 * normal.pressing(0.2);
@@ -183,7 +241,9 @@ fn d_a_spinning_sphere_on_a_plane() {
         let g = &impact.grains[0];
         assert_close("v_t", g.velocity.x, exact, 1e-5);
         assert_close("ω", spin - g.spin.y, 25.0 * exact, 1e-5);
-        assert!((lammps / exact - 1.0_f64).abs() > 0.05 && (liggghts / exact - 1.0_f64).abs() > 0.05);
+        assert!(
+            (lammps / exact - 1.0_f64).abs() > 0.05 && (liggghts / exact - 1.0_f64).abs() > 0.05
+        );
         assert!(friction.most < 1.0 + 1e-12, "{}", friction.most);
         assert_eq!(friction.drives, 0, "friction drove the slip");
     }
@@ -204,11 +264,18 @@ fn d_a_spinning_sphere_on_a_plane() {
 #[test]
 fn e_two_spinning_spheres() {
     // As D, each at 0.2 m/s, both spinning alike: ±μ ∫|F_n| dt/m with half the relative speed each.
-    let law = with(elastic(ALLOY, ALLOY, 0.5, 0.4), SpringMemory::Energy, Lever::Radius);
+    let law = with(
+        elastic(ALLOY, ALLOY, 0.5, 0.4),
+        SpringMemory::Energy,
+        Lever::Radius,
+    );
     let m = 4.0 / 3.0 * PI * 1e-3 * 2699.0;
     let exact = 0.5 * 0.4 * normal_impact(&law, 0.5 * m, 0.05, 0.4).pressing(0.4);
     assert_close("exact", exact, 0.128_045_3, 1e-6);
-    for (spin, lammps, liggghts) in [(5.0, -0.107_002, -0.140_034), (15.0, -0.115_334, -0.140_473)] {
+    for (spin, lammps, liggghts) in [
+        (5.0, -0.107_002, -0.140_034),
+        (15.0, -0.115_334, -0.140_473),
+    ] {
         let ball = |v| sphere(0.1, 2699.0, [0.0, 0.0, v], [0.0, spin, 0.0]);
         let mut friction = Friction::default();
         let impact = watch(&mut pair(law, ball(0.2), ball(-0.2), 1e-7), |now| {
@@ -223,7 +290,9 @@ fn e_two_spinning_spheres() {
         // The line of centres turns by a part in a thousand.
         assert_close("v_t", impact.grains[0].velocity.x, -exact, 1e-3);
         assert_close("v_t", impact.grains[1].velocity.x, exact, 1e-3);
-        assert!((lammps / -exact - 1.0_f64).abs() > 0.05 && (liggghts / -exact - 1.0_f64).abs() > 0.05);
+        assert!(
+            (lammps / -exact - 1.0_f64).abs() > 0.05 && (liggghts / -exact - 1.0_f64).abs() > 0.05
+        );
         assert!(friction.most < 1.0 + 1e-9, "{}", friction.most);
         assert_eq!(friction.drives, 0, "friction drove the slip");
     }

@@ -24,6 +24,8 @@
 
 pub mod cohesion;
 pub mod composition;
+#[cfg(test)]
+mod cycles;
 pub mod epsd;
 pub mod hertz;
 pub mod hooke;
@@ -56,7 +58,9 @@ pub use viscoelastic::Viscoelastic;
 #[serde(rename_all = "kebab-case")]
 pub enum Lever {
     /// The lever arms share the distance of the centres as the radii do, `l_i = R_i r/(R_i + R_j)`:
-    /// `l_i + l_j = r`, so angular momentum is conserved exactly.
+    /// `l_i + l_j = r`, so angular momentum is conserved exactly. On a wall the arm ends at the plane,
+    /// shorter than the radius by the overlap: not the limit of a growing partner, which takes the
+    /// overlap's share with its radius.
     #[default]
     ContactPoint,
     /// The arms are the undeformed radii, as in LAMMPS `gran/hooke/history`: angular momentum is
