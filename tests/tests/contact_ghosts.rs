@@ -114,9 +114,8 @@ fn no_impact_gains_energy_under_any_law_at_any_angle() {
 #[test]
 fn nor_without_dashpots() {
     // Springs alone: what the step's own error leaves, which falls with its length.
-    for (steps, allowed) in [(60.0, 2e-2), (240.0, 1.5e-3)] {
+    for (steps, allowed) in [(60.0, 3e-4), (240.0, 4e-5)] {
         let (which, gain) = largest_gain(1.0, steps);
-        println!("{steps}: {which}: {gain:e}");
         assert!(gain < allowed, "{which}: gains {gain:e}");
     }
 }

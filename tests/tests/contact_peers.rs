@@ -71,9 +71,12 @@ fn b_restitution_on_a_plane() {
     }
 }
 
+/// v_t (m/s) and ω (rad/s) after an impact.
+type Out = [f64; 2];
+
 /// Angle from the normal (degrees); v_t (m/s) and ω (rad/s) out of LAMMPS `mindlin`, `mindlin_rescale`
 /// and LIGGGHTS `history`.
-const OBLIQUE: [(f64, [f64; 2], [f64; 2], [f64; 2]); 9] = [
+const OBLIQUE: [(f64, Out, Out, Out); 9] = [
     (
         2.0,
         [0.131_271_8, 4.836_219],
@@ -130,7 +133,7 @@ const OBLIQUE: [(f64, [f64; 2], [f64; 2], [f64; 2]); 9] = [
     ),
 ];
 
-fn oblique(law: ContactLaw, degrees: f64) -> [f64; 2] {
+fn oblique(law: ContactLaw, degrees: f64) -> Out {
     let (s, c) = degrees.to_radians().sin_cos();
     let ball = sphere(2.5e-3, 4000.0, [3.9 * s, 0.0, -3.9 * c], [0.0; 3]);
     let impact = collide(&mut on_floor(law, ball, 2e-9));
