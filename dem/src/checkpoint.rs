@@ -59,6 +59,7 @@ impl Simulation {
         let levels = self.list.levels.iter();
         let grids = levels.flat_map(|l| [l.grid.origin, l.grid.inverse_cell, [l.radius, 0.0, 0.0]]);
         numbers("list/grid", grids.flatten().collect());
+        numbers("list/skin", vec![self.skin, self.hold]);
         numbers("list/age", vec![self.list.age]);
         let walls = &self.plane_contacts;
         let histories: Vec<_> = walls.contacts.iter().map(|c| c.history).collect();
@@ -75,6 +76,8 @@ impl Simulation {
         };
         counts("grains/id", wide(&self.grains.id));
         let material = self.grains.material[..n].iter().map(|&m| u64::from(m));
+        let numbered = [self.setup_grains as u64, u64::from(self.next_id)];
+        counts("grains/numbered", numbered.to_vec());
         counts("grains/material", material.collect());
         counts("contacts/pair", pairs);
         counts("list/first", wide(&self.list.first));
@@ -108,7 +111,26 @@ impl Simulation {
     }
 
     fn read(&mut self, record: &Record) -> Result<(), String> {
-        let n = self.grains.len();
+        let &[of_setup, next_id] = record.counts("grains/numbered")? else {
+            return Err("array `grains/numbered` must have 2 numbers".into());
+        };
+        if of_setup != self.setup_grains as u64 {
+            let grains = self.setup_grains;
+            return Err(format!(
+                "array `grains/numbered` is of a scene with {of_setup} grains, not {grains}"
+            ));
+        }
+        let id = narrow("grains/id", record.counts("grains/id")?)?;
+        let n = id.len();
+        let mut numbers = id.clone();
+        numbers.sort_unstable();
+        if numbers.windows(2).any(|w| w[0] == w[1])
+            || numbers.last().is_some_and(|&id| u64::from(id) >= next_id)
+            || next_id > u64::from(u32::MAX)
+        {
+            return Err("array `grains/id` does not number the grains of this scene".into());
+        }
+        self.next_id = next_id as u32;
         let sized = |name: &str, len: usize| -> Result<&[f64], String> {
             let values = record.numbers(name)?;
             if values.len() == len {
@@ -125,7 +147,7 @@ impl Simulation {
             motion: rows(sized("grains/motion", 4 * n)?),
             turn: rows(sized("grains/turn", 4 * n)?),
             mass: sized("grains/mass", n)?.to_vec(),
-            id: narrow("grains/id", record.counts("grains/id")?)?,
+            id,
             material: record
                 .counts("grains/material")?
                 .iter()
@@ -137,9 +159,6 @@ impl Simulation {
         if grains.material.len() != n || !grains.material.iter().all(known) {
             return Err("array `grains/material` names unknown materials".into());
         }
-        if grains.id.len() != n || grains.id.iter().any(|&id| id as usize >= n) {
-            return Err("array `grains/id` does not number the grains of this scene".into());
-        }
         let finite = |rows: &[[f64; 4]]| rows.iter().flatten().all(|x| x.is_finite());
         if !finite(&grains.place) || !finite(&grains.motion) || !finite(&grains.turn) {
             return Err(
@@ -147,6 +166,9 @@ impl Simulation {
             );
         }
         grains.pad();
+        let lists = sized("list/skin", 2)?;
+        self.set_skin(lists[0]);
+        self.hold = lists[1];
         let first = narrow("list/first", record.counts("list/first")?)?;
         let partner = narrow("list/partner", record.counts("list/partner")?)?;
         let rising = first.first() == Some(&0) && first.windows(2).all(|w| w[0] <= w[1]);

@@ -97,18 +97,50 @@ impl Next {
 impl Grains {
     pub fn new(grains: &[Grain]) -> Self {
         let mut state = Grains::default();
-        for (id, g) in grains.iter().enumerate() {
-            let (x, v, s) = (g.position, g.velocity, g.spin * g.radius);
-            let inverse_mass = if g.fixed { 0.0 } else { 1.0 / g.mass() };
-            state.place.push([x.x, x.y, x.z, g.radius]);
-            state.motion.push([v.x, v.y, v.z, inverse_mass]);
-            state.turn.push([s.x, s.y, s.z, 1.0 / g.radius]);
-            state.mass.push(g.mass());
-            state.id.push(id as u32);
-            state.material.push(g.material);
-        }
+        state.extend(grains, 0);
         state.pad();
         state
+    }
+
+    fn extend(&mut self, grains: &[Grain], first_id: u32) {
+        for (id, g) in (first_id..).zip(grains) {
+            let (x, v, s) = (g.position, g.velocity, g.spin * g.radius);
+            let inverse_mass = if g.fixed { 0.0 } else { 1.0 / g.mass() };
+            self.place.push([x.x, x.y, x.z, g.radius]);
+            self.motion.push([v.x, v.y, v.z, inverse_mass]);
+            self.turn.push([s.x, s.y, s.z, 1.0 / g.radius]);
+            self.mass.push(g.mass());
+            self.id.push(id);
+            self.material.push(g.material);
+        }
+    }
+
+    /// Puts grains behind the last one.
+    pub fn append(&mut self, grains: &[Grain], first_id: u32) {
+        self.unpad();
+        self.extend(grains, first_id);
+        self.pad();
+    }
+
+    /// Takes out the grains that go; the others close up.
+    pub fn keep(&mut self, goes: &[bool]) {
+        self.unpad();
+        thin(&mut self.place, goes);
+        thin(&mut self.motion, goes);
+        thin(&mut self.turn, goes);
+        thin(&mut self.mass, goes);
+        thin(&mut self.id, goes);
+        thin(&mut self.material, goes);
+        self.pad();
+    }
+
+    /// Takes the dummy away.
+    fn unpad(&mut self) {
+        let n = self.len();
+        self.place.truncate(n);
+        self.motion.truncate(n);
+        self.turn.truncate(n);
+        self.material.truncate(n);
     }
 
     /// Puts the dummy behind the last grain and makes room for a step.
@@ -171,6 +203,11 @@ impl Grains {
         std::mem::swap(&mut self.motion, &mut self.next.motion);
         std::mem::swap(&mut self.turn, &mut self.next.turn);
     }
+}
+
+fn thin<T>(values: &mut Vec<T>, goes: &[bool]) {
+    let mut goes = goes.iter();
+    values.retain(|_| !goes.next().copied().unwrap_or(false));
 }
 
 /// The first three numbers of a row.

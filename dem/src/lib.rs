@@ -22,6 +22,7 @@ mod motion;
 mod neighbours;
 mod observe;
 mod planes;
+mod population;
 pub mod preparation;
 mod reach;
 mod record;

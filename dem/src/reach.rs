@@ -175,6 +175,12 @@ impl Reach {
         }
     }
 
+    /// Goes by another smallest diameter.
+    pub fn set_diameter(&mut self, diameter: f64) {
+        self.skin *= diameter / self.diameter;
+        self.diameter = diameter;
+    }
+
     /// Goes to the skin at which steps would have been cheapest, at most twice or half of the last.
     ///
     /// Near the present skin s the number of pairs grows as `a s`, and the list lasts about `b s`

@@ -230,29 +230,8 @@ impl Setup {
         for (k, g) in self.gravity.iter().enumerate() {
             check(&format!("gravity[{k}]"), *g, "finite, m/s²", |_| true)?;
         }
-        let mut largest: f64 = 0.0;
-        for (k, g) in self.grains.iter().enumerate() {
-            check(&format!("grains[{k}].radius"), g.radius, "> 0 m", |v| {
-                v > 0.0
-            })?;
-            check(
-                &format!("grains[{k}].density"),
-                g.density,
-                "> 0 kg/m³",
-                |v| v > 0.0,
-            )?;
-            for (name, v) in [
-                ("position", &g.position),
-                ("velocity", &g.velocity),
-                ("spin", &g.spin),
-            ] {
-                for c in v.iter() {
-                    check(&format!("grains[{k}].{name}"), *c, "finite", |_| true)?;
-                }
-            }
-            self.known_material(g.material)?;
-            largest = largest.max(g.radius);
-        }
+        let materials = self.law.own.len();
+        let largest = check_grains(&self.grains, materials)?;
         for (k, p) in self.planes.iter().enumerate() {
             check(
                 &format!("planes[{k}].normal"),
@@ -260,31 +239,65 @@ impl Setup {
                 "a unit vector",
                 |v| (v - 1.0).abs() < 1e-9,
             )?;
-            self.known_material(p.material)?;
+            known_material(p.material, materials)?;
         }
-        let least = 2.0 * (2.0 * largest + skin);
-        for (k, axis) in ['x', 'y', 'z'].into_iter().enumerate() {
-            let length = self.domain.lengths()[k];
-            check(&format!("domain.{axis}"), length, "> 0 m", |v| v > 0.0)?;
-            if self.domain.periodic[k] && length < least {
-                return Err(SetupError::NarrowDomain {
-                    axis,
-                    length,
-                    least,
-                });
-            }
-        }
+        check_box(&self.domain, largest, skin)?;
         Ok(law)
     }
+}
 
-    fn known_material(&self, material: u16) -> Result<(), SetupError> {
-        let (material, materials) = (usize::from(material), self.law.own.len());
-        if material < materials {
-            return Ok(());
+/// Checks grains; their largest radius.
+pub(crate) fn check_grains(grains: &[Grain], materials: usize) -> Result<f64, SetupError> {
+    let mut largest: f64 = 0.0;
+    for (k, g) in grains.iter().enumerate() {
+        check(&format!("grains[{k}].radius"), g.radius, "> 0 m", |v| {
+            v > 0.0
+        })?;
+        check(
+            &format!("grains[{k}].density"),
+            g.density,
+            "> 0 kg/m³",
+            |v| v > 0.0,
+        )?;
+        for (name, v) in [
+            ("position", &g.position),
+            ("velocity", &g.velocity),
+            ("spin", &g.spin),
+        ] {
+            for c in v.iter() {
+                check(&format!("grains[{k}].{name}"), *c, "finite", |_| true)?;
+            }
         }
-        Err(SetupError::Material {
-            material,
-            materials,
-        })
+        known_material(g.material, materials)?;
+        largest = largest.max(g.radius);
     }
+    Ok(largest)
+}
+
+/// Checks that a pair has one nearest image, with this largest radius and skin of the list.
+pub(crate) fn check_box(domain: &Domain, largest: f64, skin: f64) -> Result<(), SetupError> {
+    let least = 2.0 * (2.0 * largest + skin);
+    for (k, axis) in ['x', 'y', 'z'].into_iter().enumerate() {
+        let length = domain.lengths()[k];
+        check(&format!("domain.{axis}"), length, "> 0 m", |v| v > 0.0)?;
+        if domain.periodic[k] && length < least {
+            return Err(SetupError::NarrowDomain {
+                axis,
+                length,
+                least,
+            });
+        }
+    }
+    Ok(())
+}
+
+fn known_material(material: u16, materials: usize) -> Result<(), SetupError> {
+    let material = usize::from(material);
+    if material < materials {
+        return Ok(());
+    }
+    Err(SetupError::Material {
+        material,
+        materials,
+    })
 }

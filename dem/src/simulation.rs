@@ -10,6 +10,7 @@ use crate::ledger::EnergyLedger;
 use crate::motion::Motion;
 use crate::neighbours::Neighbours;
 use crate::planes::{Plane, PlaneContacts};
+use crate::population::GONE;
 use crate::reach::{Making, Reach};
 use crate::setup::{Setup, SetupError, Threads};
 use crate::snapshot::GrainSample;
@@ -129,6 +130,9 @@ pub struct Simulation {
     parallel: bool,
     pub(crate) skin: f64,
     pub(crate) grains: Grains,
+    /// Grains of the setup, and the number that the next grain will get.
+    pub(crate) setup_grains: usize,
+    pub(crate) next_id: u32,
     pub(crate) list: Neighbours,
     pub(crate) reach: Reach,
     pub(crate) plane_contacts: PlaneContacts,
@@ -160,6 +164,17 @@ pub struct Simulation {
     rebuilds: u64,
 }
 
+/// Skin of the Verlet list for grains of this smallest radius (m).
+fn skin_of(smallest: f64) -> f64 {
+    SKIN * 2.0 * if smallest.is_finite() { smallest } else { 1.0 }
+}
+
+/// Largest gap that a contact of grains up to this radius holds across (m).
+fn hold_of(law: &LawTable, largest: f64) -> f64 {
+    let hold = |law: &ContactLaw| law.reach(largest);
+    law.laws().iter().map(hold).fold(0.0, f64::max)
+}
+
 impl Simulation {
     /// Checks a setup and makes it ready to step.
     pub fn new(setup: Setup) -> Result<Simulation, SetupError> {
@@ -174,20 +189,21 @@ impl Simulation {
         let radii = || setup.grains.iter().map(|g| g.radius);
         let smallest = radii().fold(f64::INFINITY, f64::min);
         let largest_radius = radii().fold(0.0, f64::max);
-        let skin = SKIN * 2.0 * if smallest.is_finite() { smallest } else { 1.0 };
+        let skin = skin_of(smallest);
         let law = setup.validate(skin)?;
-        let hold = |law: &ContactLaw| law.reach(largest_radius);
         Ok(Simulation {
             domain: setup.domain,
             gravity: setup.gravity,
             layout: law.visit(LayoutOf),
-            hold: law.laws().iter().map(hold).fold(0.0, f64::max),
+            hold: hold_of(&law, largest_radius),
             law: Arc::new(law),
             planes: setup.planes,
             timestep: setup.timestep,
             parallel: setup.threads == Threads::Rayon,
             skin,
             grains: Grains::new(&setup.grains),
+            setup_grains: setup.grains.len(),
+            next_id: setup.grains.len() as u32,
             list: Neighbours::default(),
             reach: Reach::new(skin / SKIN),
             plane_contacts: PlaneContacts::default(),
@@ -418,26 +434,55 @@ impl Simulation {
         }
     }
 
-    fn rebuild(&mut self) {
+    /// Checks that the box suits grains between two radii.
+    pub(crate) fn check_box(&self, largest: f64, smallest: f64) -> Result<(), SetupError> {
+        crate::setup::check_box(&self.domain, largest, skin_of(smallest))
+    }
+
+    /// Chooses how far lists reach for grains between two radii.
+    pub(crate) fn size_lists(&mut self, smallest: f64, largest: f64) {
+        self.set_skin(skin_of(smallest));
+        self.hold = hold_of(&self.law, largest);
+    }
+
+    pub(crate) fn set_skin(&mut self, skin: f64) {
+        self.skin = skin;
+        self.reach.set_diameter(skin / SKIN);
+    }
+
+    pub(crate) fn rebuild(&mut self) {
+        self.rebuild_from(&|old| old);
+    }
+
+    /// Builds all lists anew; `remaining` says where a grain of the old lists is now, if it is.
+    pub(crate) fn rebuild_from(&mut self, remaining: &dyn Fn(u32) -> u32) {
         self.fold_impulses();
         let listed = self.skin + self.hold;
         self.list
             .build(&mut self.grains, &self.domain, listed, self.parallel);
         let (list, touching) = (&self.list, &mut self.touching);
         let (width, flips) = (self.layout.history, self.layout.flips);
+        let place = |old: u32| match remaining(old) {
+            GONE => GONE,
+            old => list.new_index(old),
+        };
         touching.open(width, self.grains.len(), &mut self.grains.next);
         self.reach.compact(width);
         self.reach.compacted(width, |i, j, _| {
-            touching.count(list.new_index(i), list.new_index(j));
+            let (i, j) = (place(i), place(j));
+            if i != GONE && j != GONE {
+                touching.count(i, j);
+            }
         });
         touching.lay();
         self.reach.compacted(width, |i, j, history| {
-            touching.put(list.new_index(i), list.new_index(j), history, flips);
+            let (i, j) = (place(i), place(j));
+            if i != GONE && j != GONE {
+                touching.put(i, j, history, flips);
+            }
         });
         self.plane_contacts
-            .build(&self.planes, &self.grains, &list.rows, listed, |old| {
-                list.new_index(old)
-            });
+            .build(&self.planes, &self.grains, &list.rows, listed, place);
         self.renew_rows();
         self.make_reach(true);
         self.rebuilds += 1;

@@ -1,0 +1,127 @@
+//! Grains that come and go during a run.
+//!
+//! All others keep their contacts and histories bit for bit. Numbers of grains (`id`) are given once
+//! and never again. The momentum account takes in what comes and gives out what goes; an energy
+//! ledger that is open is opened anew.
+
+use crate::grains::{Grain, SPHERE_INERTIA, vector};
+use crate::motion;
+use crate::setup::{SetupError, check_grains};
+use crate::simulation::Simulation;
+use crate::snapshot::GrainSample;
+use nalgebra::Vector3;
+use std::ops::Range;
+
+impl Simulation {
+    /// Puts grains in; their velocities belong to the time of their positions. Returns their numbers.
+    ///
+    /// In a run the velocities of all grains live half a step back. New grains are taken back there
+    /// by half a kick of the forces of this instant, so that their first whole kick makes up for it.
+    ///
+    /// # Errors
+    /// If a number is out of its range, or a periodic box too narrow for a new grain. Nothing has
+    /// changed then.
+    pub fn insert(&mut self, grains: &[Grain]) -> Result<Range<u32>, SetupError> {
+        let largest = check_grains(grains, self.law.materials())?;
+        let present = self.grains.place[..self.grains.len()].iter();
+        let (small, large) = present.fold((f64::INFINITY, largest), |(small, large), x| {
+            (small.min(x[3]), large.max(x[3]))
+        });
+        let small = grains.iter().fold(small, |small, g| small.min(g.radius));
+        if grains.is_empty() {
+            return Ok(self.next_id..self.next_id);
+        }
+        self.check_box(large, small)?;
+        let end = u32::try_from(grains.len())
+            .ok()
+            .and_then(|count| self.next_id.checked_add(count))
+            .ok_or(SetupError::OutOfRange {
+                key: "grains inserted so far".into(),
+                value: f64::from(self.next_id) + grains.len() as f64,
+                allowed: "below 2³²",
+            })?;
+        let ids = self.next_id..end;
+        self.forget_observation();
+        self.size_lists(small, large);
+        self.grains.append(grains, ids.start);
+        self.next_id = end;
+        self.rebuild();
+        let new = |id: &u32| ids.contains(id);
+        let places = self.grains.id.iter().enumerate();
+        let places: Vec<usize> = places.filter(|(_, id)| new(id)).map(|(i, _)| i).collect();
+        if self.steps_since_start > 0 {
+            self.take_back(&places);
+        }
+        for i in places {
+            self.account += self.held_momentum(i);
+        }
+        self.population_changed();
+        Ok(ids)
+    }
+
+    /// Takes out all grains for which `f` says so, and says how many.
+    pub fn remove(&mut self, mut f: impl FnMut(&GrainSample) -> bool) -> usize {
+        let goes: Vec<bool> = self.samples().iter().map(&mut f).collect();
+        let count = goes.iter().filter(|&&goes| goes).count();
+        if count == 0 {
+            return 0;
+        }
+        self.forget_observation();
+        for i in (0..goes.len()).filter(|&i| goes[i]) {
+            self.account -= self.held_momentum(i);
+        }
+        let mut left = 0;
+        let remaining = goes.iter().map(|&goes| {
+            left += u32::from(!goes);
+            if goes { GONE } else { left - 1 }
+        });
+        let remaining: Vec<u32> = remaining.collect();
+        self.fold_impulses();
+        self.grains.keep(&goes);
+        self.rebuild_from(&|old| remaining[old as usize]);
+        self.population_changed();
+        count
+    }
+
+    /// Momentum of a free grain as the integrator holds it.
+    fn held_momentum(&self, i: usize) -> Vector3<f64> {
+        if self.grains.is_fixed(i) {
+            Vector3::zeros()
+        } else {
+            self.grains.mass[i] * vector(&self.grains.motion[i])
+        }
+    }
+
+    /// Takes the velocities of grains half a step back.
+    fn take_back(&mut self, grains: &[usize]) {
+        self.observe();
+        let half = 0.5 * self.timestep;
+        for &i in grains {
+            let inverse_mass = self.grains.motion[i][3];
+            if inverse_mass == 0.0 {
+                continue;
+            }
+            let rows = self.layout.slot_rows;
+            let sums = motion::gather(&self.reach, &self.plane_contacts, rows, i);
+            let [force, torque, moment] = sums.map(|sum| vector(&sum));
+            let inverse_radius = self.grains.turn[i][3];
+            let back = half * (force * inverse_mass + self.gravity);
+            let turn = half / SPHERE_INERTIA * inverse_mass * (torque + moment * inverse_radius);
+            for k in 0..3 {
+                self.grains.motion[i][k] -= back[k];
+                self.grains.turn[i][k] -= turn[k];
+            }
+        }
+        self.forget_observation();
+    }
+
+    fn population_changed(&mut self) {
+        self.weigh();
+        if self.ledger.is_some() {
+            self.open_energy_ledger();
+        }
+    }
+}
+
+/// The new place of a grain that has gone.
+pub(crate) const GONE: u32 = u32::MAX;
