@@ -1,6 +1,9 @@
 //! Histories of touching contacts on their way from one list to the next.
 
-use crate::grains::Next;
+use crate::grains::{Grains, Next};
+use crate::population::GONE;
+use crate::reach::Reach;
+use crate::simulation::Layout;
 use std::ops::Range;
 
 /// Touching contacts by their lower grain.
@@ -20,6 +23,32 @@ pub(crate) struct Touching {
 }
 
 impl Touching {
+    /// Collects all contacts of a list, whose pairs are lost; `place` says where a grain of it is now.
+    pub fn collect(
+        &mut self,
+        reach: &mut Reach,
+        grains: &mut Grains,
+        layout: Layout,
+        place: &dyn Fn(u32) -> u32,
+    ) {
+        let (width, n) = (layout.history, grains.len());
+        self.open(width, n, &mut grains.next);
+        reach.compact(width);
+        reach.compacted(width, |i, j, _| {
+            let (i, j) = (place(i), place(j));
+            if i != GONE && j != GONE {
+                self.count(i, j);
+            }
+        });
+        self.lay();
+        reach.compacted(width, |i, j, history| {
+            let (i, j) = (place(i), place(j));
+            if i != GONE && j != GONE {
+                self.put(i, j, history, layout.flips);
+            }
+        });
+    }
+
     /// Makes ready for contacts between `n` grains.
     pub fn open(&mut self, width: usize, n: usize, next: &mut Next) {
         self.width = width;

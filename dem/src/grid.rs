@@ -57,6 +57,11 @@ impl Grid {
         };
     }
 
+    /// Whether the last layer of rows is next to the first.
+    pub fn closes(&self) -> bool {
+        self.periodic[self.across[1]]
+    }
+
     /// Number of rows.
     pub fn rows(&self) -> usize {
         self.cells[self.across[0]] * self.cells[self.across[1]]

@@ -124,6 +124,8 @@ pub(crate) struct Reach {
     diameter: f64,
     /// Steps since the list was made.
     pub steps: u32,
+    /// Whether chunks are shared out over threads.
+    pub parallel: bool,
     /// Travel of each row since this list was made (m).
     pub travel: Vec<f64>,
     /// Time since then (s).
@@ -150,6 +152,9 @@ pub(crate) const BLOCK: usize = 128;
 /// Fewest grains of a chunk: below that a thread costs more than it gives.
 const GRAINS_A_CHUNK: usize = 700;
 
+/// Grains from which on slots of all pairs are too many for the cache.
+const GRAINS_TO_HALVE: usize = 8192;
+
 /// Chunks for each thread: more than one, so that a thread that is held up can be helped.
 const CHUNKS_A_THREAD: usize = 2;
 
@@ -168,6 +173,7 @@ impl Reach {
             skin: SKIN * diameter,
             diameter,
             steps: 0,
+            parallel: false,
             travel: Vec::new(),
             age: 0.0,
             allowance: Allowance::default(),
@@ -214,8 +220,11 @@ impl Reach {
         } else {
             1
         };
+        self.parallel = threads > 1;
+        let around = making.list.levels.first().is_some_and(|l| l.grid.closes());
         let pieces = if threads == 1 {
-            1
+            // The first rows touch the last ones: between halves, their slots need not wait.
+            if around && n >= GRAINS_TO_HALVE { 2 } else { 1 }
         } else {
             (threads * CHUNKS_A_THREAD).min(n / GRAINS_A_CHUNK).max(1)
         };
@@ -252,7 +261,7 @@ impl Reach {
         self.chunks.truncate(used);
         let skin = self.skin;
         let deal = |chunk: &mut Chunk| chunk.take_up(touching, making, skin);
-        if self.chunks.len() > 1 {
+        if self.parallel {
             self.chunks.par_iter_mut().for_each(deal);
         } else {
             self.chunks.iter_mut().for_each(deal);
@@ -268,7 +277,7 @@ impl Reach {
             chunk.compact(making.width);
             chunk.fill(making, skin);
         };
-        if self.chunks.len() > 1 {
+        if self.parallel {
             self.chunks.par_iter_mut().for_each(renew);
         } else {
             self.chunks.iter_mut().for_each(renew);
@@ -333,7 +342,7 @@ impl Reach {
     /// Brings all histories to the front of their chunks; the list is of no use until it is made anew.
     pub fn compact(&mut self, width: usize) {
         let compact = |chunk: &mut Chunk| chunk.compact(width);
-        if self.chunks.len() > 1 {
+        if self.parallel {
             self.chunks.par_iter_mut().for_each(compact);
         } else {
             self.chunks.iter_mut().for_each(compact);

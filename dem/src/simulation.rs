@@ -329,6 +329,7 @@ impl Simulation {
         let grains = &mut self.grains;
         let sweep = Sweep {
             pass,
+            parallel: self.parallel && self.reach.parallel,
             field: Field {
                 place: &grains.place,
                 motion: &grains.motion,
@@ -460,27 +461,13 @@ impl Simulation {
         let listed = self.skin + self.hold;
         self.list
             .build(&mut self.grains, &self.domain, listed, self.parallel);
-        let (list, touching) = (&self.list, &mut self.touching);
-        let (width, flips) = (self.layout.history, self.layout.flips);
+        let list = &self.list;
         let place = |old: u32| match remaining(old) {
             GONE => GONE,
             old => list.new_index(old),
         };
-        touching.open(width, self.grains.len(), &mut self.grains.next);
-        self.reach.compact(width);
-        self.reach.compacted(width, |i, j, _| {
-            let (i, j) = (place(i), place(j));
-            if i != GONE && j != GONE {
-                touching.count(i, j);
-            }
-        });
-        touching.lay();
-        self.reach.compacted(width, |i, j, history| {
-            let (i, j) = (place(i), place(j));
-            if i != GONE && j != GONE {
-                touching.put(i, j, history, flips);
-            }
-        });
+        self.touching
+            .collect(&mut self.reach, &mut self.grains, self.layout, &place);
         self.plane_contacts
             .build(&self.planes, &self.grains, &list.rows, listed, place);
         self.renew_rows();
@@ -654,6 +641,13 @@ impl Simulation {
 
     /// Shares steps out over the current rayon pool, or not. The results are the same bits.
     pub fn set_threads(&mut self, threads: Threads) {
-        self.parallel = threads == Threads::Rayon;
+        let parallel = threads == Threads::Rayon;
+        if parallel != self.parallel {
+            self.parallel = parallel;
+            self.forget_observation();
+            let (reach, grains) = (&mut self.reach, &mut self.grains);
+            self.touching.collect(reach, grains, self.layout, &|i| i);
+            self.make_reach(true);
+        }
     }
 }

@@ -33,6 +33,8 @@ pub(crate) enum Pass {
 #[derive(Clone, Copy)]
 pub(crate) struct Sweep<'a> {
     pub pass: Pass,
+    /// Whether chunks are shared out over threads.
+    pub parallel: bool,
     pub field: Field<'a>,
     pub planes: &'a PlaneContacts,
     pub rows: &'a [Row],
@@ -147,10 +149,13 @@ fn first<I: Interaction>(
     }
     let (front, back) = chunks.split_at_mut(chunks.len() / 2);
     let (moved_front, moved_back) = moved.cut(&back[0], sweep.fixed);
-    let (a, b) = rayon::join(
-        || first(law, sweep, front, moved_front, wide),
-        || first(law, sweep, back, moved_back, wide),
-    );
+    let front = || first(law, sweep, front, moved_front, wide);
+    let back = || first(law, sweep, back, moved_back, wide);
+    let (a, b) = if sweep.parallel {
+        rayon::join(front, back)
+    } else {
+        (front(), back())
+    };
     a.max(b)
 }
 
@@ -174,10 +179,14 @@ fn second<I: Interaction>(
     }
     let (front, back) = chunks.split_at(chunks.len() / 2);
     let (moved_front, moved_back) = moved.cut(&back[0], sweep.fixed);
-    rayon::join(
-        || second::<I>(sweep, all, front, moved_front, wide),
-        || second::<I>(sweep, all, back, moved_back, wide),
-    );
+    let front = || second::<I>(sweep, all, front, moved_front, wide);
+    let back = || second::<I>(sweep, all, back, moved_back, wide);
+    if sweep.parallel {
+        rayon::join(front, back);
+    } else {
+        front();
+        back();
+    }
 }
 
 /// The sweep compiled for AVX2.

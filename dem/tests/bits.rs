@@ -91,6 +91,16 @@ fn threads_do_not_change_a_bit() {
     for threads in [1, 2, 3] {
         assert_eq!(in_pool(threads, || run(Threads::Rayon)), serial);
     }
+    // Nor does a change of threads on the way.
+    let mut s = flowing(Threads::Serial);
+    s.advance(1400).unwrap();
+    s.energy();
+    let changed = in_pool(2, move || {
+        s.set_threads(Threads::Rayon);
+        s.advance(1600).unwrap();
+        s.state_hash()
+    });
+    assert_eq!(changed, serial.0);
     // The hash must see a change of one bit of state.
     let mut s = flowing(Threads::Serial);
     s.advance(2999).unwrap();
