@@ -1,8 +1,12 @@
 //! Fixtures shared by the tests across crates: materials, beds, other codes' figures.
 
+pub mod fit;
+pub mod gas;
 pub mod impacts;
 pub mod laws;
 pub mod rebound;
+pub mod silo;
+pub mod slope;
 mod starts;
 
 pub use starts::{StartError, chute_start, read_start, settle_start, settled_start};
