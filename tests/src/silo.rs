@@ -1,15 +1,24 @@
 //! Grains between walls: columns after Janssen, hoppers after Beverloo.
 //!
-//! Units d = m = g = 1; round grains with friction 0.5, ε = 0.5, k_n 2e4 m g/d.
+//! Units d = m = g = 1; round grains with friction 0.5, ε = 0.5.
 
-use crate::{DENSITY, STIFFNESS, step};
+use crate::DENSITY;
 use colluvium_dem::{
-    ContactLaw, Domain, Grain, Hooke, Laws, Partner, Plane, Setup, SetupError, Simulation,
-    Snapshot, TangentialSpring, Threads,
+    ContactLaw, Domain, Grain, GrainSample, Hooke, Laws, Partner, Plane, Setup, SetupError,
+    Simulation, Snapshot, TangentialSpring, Threads, timestep,
 };
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
+use std::f64::consts::TAU;
+
+/// k_n d/(m g): grains overlap by a few thousandths of d under 20 d of others and at 4 √(g d).
+const STIFFNESS: f64 = 1e4;
+
+/// Contact time over 20.
+fn step() -> f64 {
+    timestep::step(1.0, STIFFNESS, 20.0)
+}
 
 /// Round grains, ε = 0.5, by their coefficient of friction.
 pub fn round(friction: f64) -> ContactLaw {
@@ -20,7 +29,7 @@ pub fn round(friction: f64) -> ContactLaw {
     )
 }
 
-/// A loose lattice over z = 0 in a box of that floor: radii uniform within 10 %, slow random motion.
+/// A loose lattice over z = 0 and a floor: radii uniform within 10 %, slow random motion.
 fn loose(count: usize, [length, width]: [f64; 2], seed: u64) -> Vec<Grain> {
     let mut random = ChaCha8Rng::seed_from_u64(seed);
     let spacing = 1.12;
@@ -161,7 +170,7 @@ impl Loads {
     }
 
     /// Load that passes through the bottom of each layer, the layer's weight, what its walls carry,
-    /// and their normal force.
+    /// and their normal force; the last layers lie on the floor.
     pub fn profile(&self) -> Vec<[f64; 4]> {
         let mut load = 0.0;
         self.layers
@@ -179,6 +188,59 @@ impl Loads {
     }
 }
 
+/// Janssen's law with what a column shows of its walls.
+///
+/// ```text
+/// F(h) = w λ (1 - e^{-h/λ}),   λ = L/(4 K μ)       F load below h of grains, w their weight a length
+/// ```
+/// L edge of the section; K μ ratio of the walls' shear stress to the vertical stress.
+#[derive(Clone, Copy, Debug)]
+pub struct Janssen {
+    /// K μ, measured on the walls.
+    pub wall_ratio: f64,
+    /// Shear force of the walls over their normal force.
+    pub mobilised: f64,
+    /// Bottom load by the law.
+    pub bottom: f64,
+    /// Root mean square deviation of the loads of all layers from the law, over the largest of them.
+    pub deviation: f64,
+}
+
+impl Janssen {
+    /// Measures the walls of a column and compares its loads.
+    pub fn of(column: &Column, loads: &Loads) -> Janssen {
+        let all = loads.profile();
+        // Ends left out: loose grains on top, and the floor, which carries some of its layer's friction.
+        let inner = &all[2..all.len() - 2];
+        let sum = |f: &dyn Fn(&[f64; 4]) -> f64| inner.iter().map(f).sum::<f64>();
+        let (load, weight, shear, normal) = (
+            sum(&|l| l[0] - 0.5 * (l[1] - l[2])),
+            sum(&|l| l[1]) / inner.len() as f64,
+            sum(&|l| l[2]),
+            sum(&|l| l[3]),
+        );
+        // A layer is 1 d: its walls' shear stress is shear/(4 L), its vertical stress load/L².
+        let wall_ratio = shear / load * column.edge / 4.0;
+        let length = column.edge / (4.0 * wall_ratio);
+        let law = |height: f64| weight * length * (1.0 - (-height / length).exp());
+        // Height by weight, so that a ragged top does not matter.
+        let mut above = 0.0;
+        let mut squares = 0.0;
+        let mut largest: f64 = 0.0;
+        for layer in &all {
+            above += layer[1];
+            squares += (layer[0] - law(above / weight)).powi(2);
+            largest = largest.max(layer[0]);
+        }
+        Janssen {
+            wall_ratio,
+            mobilised: shear / normal,
+            bottom: law(above / weight),
+            deviation: (squares / all.len() as f64).sqrt() / largest,
+        }
+    }
+}
+
 /// Shape of a hopper's opening.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub enum Opening {
@@ -188,10 +250,7 @@ pub enum Opening {
     Hole,
 }
 
-/// A flat-bottomed hopper that fills itself: the box is periodic along z too, so that what falls
-/// through the bottom comes back from above. The level stays, and the flow is as long as one likes.
-/// A roof of fixed grains under the opening throws the stream aside: it would else fall on the very
-/// place it came from and push the flow.
+/// A flat-bottomed hopper, periodic sideways, of which grains fall freely.
 #[derive(Clone, Copy, Debug)]
 pub struct Hopper {
     /// The opening.
@@ -206,98 +265,102 @@ pub struct Hopper {
     pub seed: u64,
 }
 
+/// Where fallen grains are caught (d).
+const CATCH: f64 = -25.0;
+
 impl Hopper {
-    /// Grains above the bottom, falling.
+    /// Fills the hopper over a time, with its opening open, and lets grains fall; when each of the next
+    /// `count` grains passed the opening, to a twentieth of a time unit.
     ///
     /// # Errors
-    /// If the hopper cannot be set up.
-    pub fn fill(&self) -> Result<Simulation, SetupError> {
+    /// If the hopper cannot be set up or its step is too long.
+    pub fn discharge(&self, fill: f64, count: usize) -> Result<Vec<f64>, SetupError> {
         let [length, width] = self.floor;
-        let grains = loose(self.grains, self.floor, self.seed);
-        // Settled, at a solid fraction of 0.58.
-        let level = self.grains as f64 / (length * width * 0.58 * DENSITY);
-        let highest = grains.iter().map(|g| g.position.z).fold(0.0, f64::max);
-        let height = (level + self.fall()).max(highest + self.fall());
-        let setup = Setup {
+        let shift = Vector3::new(0.5 * length, 0.5 * width, 0.0);
+        let grains = loose(self.grains, self.floor, self.seed)
+            .into_iter()
+            .map(|g| Grain {
+                position: g.position - shift,
+                ..g
+            });
+        let mut simulation = Simulation::new(Setup {
             domain: Domain {
-                lower: Vector3::new(-0.5 * length, -0.5 * width, -1.0),
-                upper: Vector3::new(0.5 * length, 0.5 * width, height - 1.0),
-                periodic: [true; 3],
+                lower: -shift + CATCH * Vector3::z(),
+                upper: shift + self.grains as f64 * Vector3::z(),
+                periodic: [true, true, false],
             },
-            gravity: Vector3::new(0.0, 0.0, -1.0),
+            gravity: -Vector3::z(),
             law: round(0.5).into(),
-            grains: vec![],
+            grains: self.bottom().chain(grains).collect(),
             planes: vec![],
             timestep: step(),
             threads: Threads::Serial,
+        })?;
+        simulation.advance((fill / simulation.timestep()) as u64)?;
+        let mut snapshot = Snapshot::default();
+        let below = |snapshot: &Snapshot| {
+            let fallen = |g: &&GrainSample| g.position.z < -1.0;
+            snapshot.grains.iter().filter(fallen).count()
         };
-        let shift = Vector3::new(0.5 * length, 0.5 * width, 0.0);
-        let grains = grains.into_iter().map(|g| Grain {
-            position: g.position - shift,
-            ..g
-        });
-        Simulation::new(Setup {
-            grains: self.bottom(height).chain(grains).collect(),
-            ..setup
-        })
+        simulation.snapshot(&mut snapshot);
+        let before = below(&snapshot);
+        let start = simulation.time();
+        let look = (0.05 / simulation.timestep()) as u64;
+        let mut times = Vec::new();
+        while times.len() < count && simulation.time() < start + 200.0 {
+            simulation.advance(look)?;
+            simulation.snapshot(&mut snapshot);
+            let now = (below(&snapshot) - before).min(count);
+            times.resize(now, simulation.time() - start);
+            if snapshot
+                .grains
+                .iter()
+                .any(|g| !g.fixed && g.position.z < CATCH)
+            {
+                // Held where they are, well below and apart from what still falls.
+                simulation.fix(|g| g.position.z < CATCH);
+            }
+        }
+        Ok(times)
     }
 
-    /// Height from the bottom down to the surface that the stream falls on, roughly: room for the
-    /// roof and for grains to roll off it.
-    fn fall(&self) -> f64 {
-        6.0 + 0.7 * self.size
-    }
-
-    /// Fixed grains: the bottom with its tops at z = 0 and the rim's surfaces at the opening's edge
-    /// exactly, and the roof below, seen from the next image of the box.
-    fn bottom(&self, height: f64) -> impl Iterator<Item = Grain> + use<> {
+    /// Fixed grains with their tops at z = 0, the rim's surfaces at the opening's edge exactly.
+    fn bottom(&self) -> impl Iterator<Item = Grain> + use<> {
         let radius = 0.5;
         let [length, width] = self.floor;
+        let rim = 0.5 * self.size + radius;
         let mut places = Vec::new();
-        let eaves = 0.5 * self.size + radius;
-        // Two grains below the rim, as steep as grains need to run off.
-        let roof = |away: f64| height - 3.0 - 1.2 * away;
         match self.opening {
             Opening::Slot => {
                 let lanes = (width / 0.9).round() as usize;
-                let room = length - 2.0 * eaves;
+                let room = length - 2.0 * rim;
                 let rows = (room / 0.9).ceil() as usize;
-                let beams = (eaves / 0.9).ceil() as isize;
-                let bottom = (0..=rows).map(|r| (eaves + room * r as f64 / rows as f64, -radius));
-                let beams = (-beams..=beams).map(|b| (0.9 * b as f64, roof(0.9 * b.abs() as f64)));
-                for (x, z) in bottom.chain(beams) {
+                for row in 0..=rows {
+                    let x = rim + room * row as f64 / rows as f64;
                     for lane in 0..lanes {
                         let y = (lane as f64 + 0.5) * width / lanes as f64;
-                        places.push(Vector3::new(x, y - 0.5 * width, z));
+                        places.push([x, y - 0.5 * width]);
                     }
                 }
             }
             Opening::Hole => {
-                let mut circle = |ring: f64, z: f64| {
-                    let around = (std::f64::consts::TAU * ring / 0.9).ceil().max(1.0);
+                let mut ring = rim;
+                while ring < 0.5 * length.hypot(width) + radius {
+                    let around = (TAU * ring / 0.9).ceil();
                     for k in 0..around as usize {
-                        let (s, c) = (std::f64::consts::TAU * k as f64 / around).sin_cos();
+                        let (s, c) = (TAU * k as f64 / around).sin_cos();
                         let (x, y) = (ring * c, ring * s);
                         if x.abs() < 0.5 * length && y.abs() < 0.5 * width {
-                            places.push(Vector3::new(x, y, z));
+                            places.push([x, y]);
                         }
                     }
-                };
-                let mut ring = 0.0;
-                while ring < eaves + 0.9 {
-                    circle(ring, roof(ring));
-                    ring += 0.9;
-                }
-                let mut ring = eaves;
-                while ring < 0.5 * length.hypot(width) + radius {
-                    circle(ring, -radius);
                     ring += 0.9;
                 }
             }
         }
-        places.into_iter().map(move |position| Grain {
+        places.into_iter().map(move |[x, y]| Grain {
             fixed: true,
-            ..Grain::at_rest(position, radius, DENSITY)
+            ..Grain::at_rest(Vector3::new(x, y, -radius), radius, DENSITY)
         })
     }
 }
