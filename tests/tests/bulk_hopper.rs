@@ -120,7 +120,7 @@ fn a_slot_discharges_as_beverloo_says() {
 #[test]
 fn a_hole_discharges_as_beverloo_says() {
     let fit = discharge(hole, 2.5, &[4.0, 5.0, 6.5], &[2], 200, 0.25);
-    check(&fit, 2.5, 0.98, [0.5, 2.0], 0.5);
+    check(&fit, 2.5, 0.98, [0.3, 2.0], 0.6);
 }
 
 #[test]
