@@ -22,6 +22,7 @@ pub mod rheology_file;
 pub mod run;
 pub mod run_directory;
 pub mod scene;
+pub mod start_file;
 pub mod state_hash;
 pub mod summary;
 pub mod table;

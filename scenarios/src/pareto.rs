@@ -1,5 +1,7 @@
 //! Error against cost: one scene run with several values of one key.
 
+mod observables;
+
 use crate::failure::{Failure, Resumes};
 use crate::report;
 use crate::run::{self, RunOptions};
@@ -7,7 +9,8 @@ use crate::run_directory::{self, RunDirectory};
 use crate::scene::{Scene, SceneBody, SceneError};
 use crate::summary::{Quantity, Status, Summary};
 use crate::table::Table;
-use std::path::{Path, PathBuf};
+use observables::{Errors, errors};
+use std::path::PathBuf;
 use std::time::Instant;
 
 /// A scene, the values of one key, and what to compare with.
@@ -27,12 +30,16 @@ pub struct Comparison {
 pub struct Row {
     /// The key's value as written.
     pub value: String,
-    /// Relative error.
+    /// Relative error; the largest where several observables are compared.
     pub error: f64,
+    /// Relative error of each observable, where there are several.
+    pub errors: Errors,
     /// Observed order between this and the run before.
     pub order: Option<f64>,
     /// Wall time (s).
     pub wall_s: f64,
+    /// Wall time of the reference run over this one's.
+    pub speed_up: Option<f64>,
     /// Grain-steps and cell-steps.
     pub steps: u64,
 }
@@ -51,6 +58,7 @@ impl Comparison {
             return Err(malformed());
         }
         let key = key.trim().to_owned();
+        let scene = of_one_duration(scene)?;
         let variants = values
             .iter()
             .map(|value| {
@@ -178,12 +186,27 @@ impl Comparison {
             None => None,
         };
         let mut rows: Vec<Row> = Vec::new();
+        let reference_cost = match &reference {
+            Some(path) => Some(report::read_summary(path)?.cost),
+            None => None,
+        };
         for (value, scene) in &self.variants {
             let path = one(&folder_name(&self.key, value), scene)?;
             let summary = report::read_summary(&path)?;
-            let error = match &reference {
-                Some(reference) => difference(&path, reference)?,
-                None => exact_error(&summary),
+            let (error, errors) = match &reference {
+                Some(reference) => {
+                    let errors = errors(&self.scene, &path, reference)?;
+                    // A missing value counts as missing, not as the best.
+                    let worst = |a: f64, &(_, b): &(String, f64)| {
+                        if a.is_nan() || b.is_nan() {
+                            f64::NAN
+                        } else {
+                            a.max(b)
+                        }
+                    };
+                    (errors.iter().fold(0.0, worst), errors)
+                }
+                None => (exact_error(&summary), Errors::new()),
             };
             let order = rows
                 .last()
@@ -191,8 +214,16 @@ impl Comparison {
             rows.push(Row {
                 value: value.clone(),
                 error,
+                errors: if errors.len() > 1 {
+                    errors
+                } else {
+                    Errors::new()
+                },
                 order,
                 wall_s: summary.cost.wall_s,
+                speed_up: reference_cost
+                    .as_ref()
+                    .map(|cost| cost.wall_s / summary.cost.wall_s),
                 steps: summary.cost.grain_steps + summary.cost.cell_steps,
             });
         }
@@ -201,7 +232,7 @@ impl Comparison {
 
     fn compared_with(&self) -> String {
         match &self.reference {
-            Some(_) => "the reference run".to_owned(),
+            Some(_) => observables::against_reference(&self.scene),
             None => match self.scene.body {
                 SceneBody::Bagnold(_) => "exact profile, relative L2 error of u".to_owned(),
                 _ => "restitution of the scene".to_owned(),
@@ -210,7 +241,7 @@ impl Comparison {
     }
 
     fn table(&self, rows: &[Row]) -> Table {
-        Table::new("pareto")
+        let mut table = Table::new("pareto")
             .with(
                 &self.key,
                 "",
@@ -225,32 +256,78 @@ impl Comparison {
                 rows.iter().map(|r| r.order.unwrap_or(f64::NAN)).collect(),
             )
             .with("wall_s", "s", rows.iter().map(|r| r.wall_s).collect())
-            .with("steps", "1", rows.iter().map(|r| r.steps as f64).collect())
+            .with("steps", "1", rows.iter().map(|r| r.steps as f64).collect());
+        if rows.iter().any(|r| r.speed_up.is_some()) {
+            let speed_up = rows.iter().map(|r| r.speed_up.unwrap_or(f64::NAN));
+            table = table.with("speed_up", "1", speed_up.collect());
+        }
+        for (n, (name, _)) in rows
+            .first()
+            .map_or(&[][..], |r| &r.errors)
+            .iter()
+            .enumerate()
+        {
+            let column = rows
+                .iter()
+                .map(|r| r.errors.get(n).map_or(f64::NAN, |e| e.1));
+            table = table.with(&format!("error_{name}"), "1", column.collect());
+        }
+        table
     }
 
     fn text(&self, rows: &[Row]) -> String {
         let width = self.key.len().max(12);
+        let names: Vec<&str> = rows
+            .first()
+            .map_or(&[][..], |r| &r.errors)
+            .iter()
+            .map(|(name, _)| name.as_str())
+            .collect();
         let mut text = format!(
-            "{:>width$}  {:>12}  {:>8}  {:>10}  {:>14}\n",
-            self.key, "error", "order", "wall [s]", "steps"
+            "{:>width$}  {:>12}  {:>8}  {:>10}  {:>8}  {:>14}",
+            self.key, "error", "order", "wall [s]", "speed-up", "steps"
         );
+        for name in &names {
+            text.push_str(&format!("  {name:>12}"));
+        }
         for row in rows {
-            let order = row
-                .order
-                .map_or_else(|| "–".to_owned(), |o| format!("{o:.3}"));
-            let error = if row.error.is_finite() {
-                format!("{:.4e}", row.error)
-            } else {
-                "none".to_owned()
+            let some =
+                |value: Option<f64>| value.map_or_else(|| "–".to_owned(), |o| format!("{o:.3}"));
+            let error = |error: f64| {
+                if error.is_finite() {
+                    format!("{error:.4e}")
+                } else {
+                    "none".to_owned()
+                }
             };
             text.push_str(&format!(
-                "{:>width$}  {:>12}  {:>8}  {:>10.4}  {:>14}\n",
-                row.value, error, order, row.wall_s, row.steps
+                "\n{:>width$}  {:>12}  {:>8}  {:>10.4}  {:>8}  {:>14}",
+                row.value,
+                error(row.error),
+                some(row.order),
+                row.wall_s,
+                some(row.speed_up),
+                row.steps
             ));
+            for (name, (_, value)) in names.iter().zip(&row.errors) {
+                let width = name.len().max(12);
+                text.push_str(&format!("  {:>width$}", error(*value)));
+            }
         }
-        text.push_str(&format!("error: {}", self.compared_with()));
+        text.push_str(&format!("\nerror: {}", self.compared_with()));
         text
     }
+}
+
+/// A bed compared at several time steps has to run for one time, not for one number of steps.
+fn of_one_duration(scene: Scene) -> Result<Scene, SceneError> {
+    let pace = match &scene.body {
+        SceneBody::Chute(body) => body.pace(),
+        SceneBody::Settle(body) => body.pace(),
+        _ => return Ok(scene),
+    };
+    let duration = pace.steps as f64 * pace.timestep;
+    scene.with(&[format!("duration={duration:?}")], "pareto")
 }
 
 fn has_exact_solution(scene: &Scene) -> bool {
@@ -288,44 +365,6 @@ fn order_between(before: &Row, value: &str, error: f64) -> Option<f64> {
     order.is_finite().then_some(order)
 }
 
-/// Relative L2 difference of the velocity profile, or of the restitution where there is none.
-fn difference(run: &Path, reference: &Path) -> Result<f64, Failure> {
-    let profile = |path: &Path| Table::from_csv(&path.join("profile.csv")).ok();
-    if let (Some(a), Some(b)) = (profile(run), profile(reference)) {
-        let (a, b) = (a.pairs("z", "u"), b.pairs("z", "u"));
-        let mut miss = 0.0;
-        let mut size = 0.0;
-        for (z, u) in a {
-            if let Some(right) = interpolate(&b, z) {
-                miss += (u - right) * (u - right);
-                size += right * right;
-            }
-        }
-        return Ok((miss / size).sqrt());
-    }
-    let value = |path: &Path| -> Result<f64, Failure> {
-        let summary = report::read_summary(path)?;
-        Ok(summary
-            .results
-            .get("restitution")
-            .and_then(|q| q.value)
-            .unwrap_or(f64::NAN))
-    };
-    let right = value(reference)?;
-    Ok((value(run)? - right).abs() / right.abs())
-}
-
-/// Linear interpolation in points of rising x; none outside of them.
-fn interpolate(points: &[(f64, f64)], x: f64) -> Option<f64> {
-    let after = points.iter().position(|p| p.0 >= x)?;
-    let (x1, y1) = points[after];
-    if x1 == x {
-        return Some(y1);
-    }
-    let (x0, y0) = *points.get(after.checked_sub(1)?)?;
-    Some(y0 + (y1 - y0) * (x - x0) / (x1 - x0))
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -335,19 +374,13 @@ mod tests {
         let row = Row {
             value: "16".into(),
             error: 4e-3,
+            errors: Errors::new(),
             order: None,
             wall_s: 1.0,
+            speed_up: None,
             steps: 1,
         };
         assert!((order_between(&row, "32", 1e-3).unwrap() - 2.0).abs() < 1e-12);
         assert_eq!(order_between(&row, "fine", 1e-3), None);
-    }
-
-    #[test]
-    fn interpolation_does_not_go_beyond_its_points() {
-        let points = [(0.0, 0.0), (1.0, 2.0)];
-        assert_eq!(interpolate(&points, 0.25), Some(0.5));
-        assert_eq!(interpolate(&points, 1.5), None);
-        assert_eq!(interpolate(&points, -0.5), None);
     }
 }

@@ -1,13 +1,16 @@
 //! The plan of a scene: what would be modelled and why, what is left out, what it would cost.
 
+mod bed;
+mod law;
+
 use crate::failure::Failure;
 use crate::run;
 use crate::run::step::Step;
 use crate::scene::{BagnoldScene, ImpactScene, InclineScene, InclineStart, Scene, SceneBody};
 use colluvium_coupling::incline::{InclineRun, InclineSpec};
-use colluvium_dem::Threads;
 use colluvium_dem::preparation::settle_incline_bed;
 use colluvium_dem::timestep;
+use colluvium_dem::{Normal, Threads};
 use std::fmt::Write;
 use std::ops::ControlFlow;
 use std::time::Instant;
@@ -17,7 +20,9 @@ pub fn plan(scene: &Scene) -> Result<String, Failure> {
     match &scene.body {
         SceneBody::Incline(body) => incline(scene, body),
         SceneBody::Bagnold(body) => Ok(bagnold(body)),
-        SceneBody::Impact(body) => Ok(impact(scene, body)),
+        SceneBody::Impact(body) => impact(scene, body),
+        SceneBody::Chute(body) => bed::chute(body),
+        SceneBody::Settle(body) => bed::settle(body),
     }
 }
 
@@ -246,10 +251,10 @@ fn bagnold(body: &BagnoldScene) -> String {
     lines.0
 }
 
-fn impact(scene: &Scene, body: &ImpactScene) -> String {
+fn impact(scene: &Scene, body: &ImpactScene) -> Result<String, Failure> {
     let mut lines = Lines::default();
     let pair = scene.name == "two-spheres";
-    let impact = run::impact::prepare(body, pair);
+    let impact = run::impact::prepare(body, pair)?;
     let what = if pair {
         "a sphere hits an equal sphere at rest"
     } else {
@@ -262,14 +267,18 @@ fn impact(scene: &Scene, body: &ImpactScene) -> String {
             scene.name, body.speed, body.impact_degrees
         ),
     );
+    law::say(&mut lines, &impact.law);
     lines.say("left out", &run::impact::left_out(body).join(", "));
+    let share = 100.0 * impact.overlap / body.radius;
+    let stiffness = match impact.law.normal {
+        Normal::Hooke(hooke) => format!("k_n = {:.4e} N/m, ", hooke.stiffness),
+        _ => String::new(),
+    };
     lines.say(
         "contact",
         &format!(
-            "k_n = {:.4e} N/m, contact time {:.4e} s, largest overlap about {:.2} % of the radius",
-            body.stiffness,
+            "{stiffness}contact time {:.4e} s, largest overlap about {share:.2} % of the radius",
             impact.contact_time,
-            100.0 * body.speed * (impact.reduced_mass / body.stiffness).sqrt() / body.radius
         ),
     );
     let step = impact.step.seconds;
@@ -278,5 +287,5 @@ fn impact(scene: &Scene, body: &ImpactScene) -> String {
         "steps",
         &format!("{:.0}, well under a second per million", impact.steps()),
     );
-    lines.0
+    Ok(lines.0)
 }

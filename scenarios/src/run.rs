@@ -1,9 +1,14 @@
 //! Running a scene: directory, checkpoints, results.
 
 pub mod bagnold;
+pub mod bed;
+pub mod chute;
+pub mod grain_table;
 pub mod impact;
+pub mod impact_scales;
 pub mod incline;
 pub mod precheck;
+pub mod settle;
 pub mod step;
 
 use crate::checkpoint::{self, Checkpoint};
@@ -14,7 +19,7 @@ use crate::run_directory::{self, RunDirectory};
 use crate::scene::{Scene, SceneBody};
 use crate::summary::{Status, Summary};
 use crate::table::Table;
-use colluvium_dem::Record;
+use colluvium_dem::{Record, Threads};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -76,6 +81,15 @@ impl Under<'_> {
     /// Wall time, parts before a restart included (s).
     pub fn wall_s(&self) -> f64 {
         self.wall_before + self.start.elapsed().as_secs_f64()
+    }
+
+    /// How the steps of this run are shared out.
+    pub fn threads_of_one_run(&self) -> Threads {
+        if self.threads > 1 {
+            Threads::Rayon
+        } else {
+            Threads::Serial
+        }
     }
 
     /// Says that the start, or the state to go on from, was accepted: from here on the directory is
@@ -175,6 +189,8 @@ pub fn check(scene: &Scene) -> Result<(), Failure> {
         SceneBody::Incline(body) => precheck::incline(scene, body),
         SceneBody::Bagnold(body) => bagnold::check(scene, body),
         SceneBody::Impact(body) => impact::check(scene, body),
+        SceneBody::Chute(body) => chute::check(scene, body),
+        SceneBody::Settle(body) => settle::check(scene, body),
     }
 }
 
@@ -212,6 +228,8 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> {
             SceneBody::Incline(body) => incline::run(body, &mut under),
             SceneBody::Bagnold(body) => bagnold::run(body, &mut under),
             SceneBody::Impact(body) => impact::run(body, &mut under),
+            SceneBody::Chute(body) => chute::run(body, &mut under),
+            SceneBody::Settle(body) => settle::run(body, &mut under),
         })
     });
     let (begun, wall_s, going_on) = (under.begun, under.wall_s(), under.resumed.is_some());

@@ -5,26 +5,37 @@
 //! that `colluvium schema` prints is what input is checked against.
 
 mod bagnold;
+mod bed;
 mod check;
+mod chute;
 mod error;
 mod impact;
 mod incline;
+mod law;
+mod law_layers;
 mod layers;
+mod settle;
 
 pub use bagnold::{BagnoldGrid, BagnoldScene, RheologyKeys, SolverKeys, SolverMethod};
+pub use bed::Pace;
+pub use chute::ChuteScene;
 pub use error::SceneError;
 pub use impact::{ImpactScene, RollingKeys};
 pub use incline::{
     Bracket, CalibrationKeys, ContactKeys, FloorKeys, GrainKeys, GuessKeys, InclineScene,
     InclineStart, SizeLaw, TimeKeys, TimestepKeys,
 };
+pub use law::{
+    CohesionKind, LawKeys, LeverKind, MemoryKind, NormalKind, Parts, RollingKind, TangentialKind,
+};
+pub use settle::{SettleFloor, SettleGrains, SettleScene};
 
 use crate::rheology_file;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// The names and texts of the bundled scenes.
-pub const BUNDLED: [(&str, &str); 6] = [
+pub const BUNDLED: [(&str, &str); 8] = [
     (
         "incline-moderate",
         include_str!("../scenes/incline-moderate.toml"),
@@ -43,6 +54,8 @@ pub const BUNDLED: [(&str, &str); 6] = [
         "sphere-on-plane",
         include_str!("../scenes/sphere-on-plane.toml"),
     ),
+    ("chute", include_str!("../scenes/chute.toml")),
+    ("settle", include_str!("../scenes/settle.toml")),
 ];
 
 /// The text of a bundled scene.
@@ -62,6 +75,10 @@ pub enum SceneBody {
     Bagnold(Box<BagnoldScene>),
     /// One impact of two spheres, or of a sphere on a plane.
     Impact(Box<ImpactScene>),
+    /// Grains on a rough chute, from a start file.
+    Chute(Box<ChuteScene>),
+    /// Grains that settle in a box.
+    Settle(Box<SettleScene>),
 }
 
 impl SceneBody {
@@ -71,8 +88,19 @@ impl SceneBody {
             SceneBody::Incline(scene) => toml::Table::try_from(scene),
             SceneBody::Bagnold(scene) => toml::Table::try_from(scene),
             SceneBody::Impact(scene) => toml::Table::try_from(scene),
+            SceneBody::Chute(scene) => toml::Table::try_from(scene),
+            SceneBody::Settle(scene) => toml::Table::try_from(scene),
         }
         .unwrap_or_default()
+    }
+
+    /// The start file, where the scene names one.
+    pub fn start_file(&self) -> Option<&str> {
+        match self {
+            SceneBody::Chute(scene) => scene.start.as_deref(),
+            SceneBody::Settle(scene) => scene.start.as_deref(),
+            _ => None,
+        }
     }
 }
 
@@ -144,15 +172,20 @@ impl Scene {
         let choices = alternatives(&name);
         // A rheology file is replaced by its numbers before layers are laid over each other, so
         // only the stiffness keys have defaults to drop.
-        let drops = if matches!(family(&name), Family::Incline) {
-            choices
-        } else {
-            &[]
+        let kind = family(&name);
+        let drops = match kind {
+            Family::Bagnold => &[],
+            _ => choices,
         };
+        let impact = matches!(kind, Family::Impact);
+        let lawful = matches!(kind, Family::Impact | Family::Chute | Family::Settle);
         check::check(&own, &schema, origin)?;
         layers::check_choices(&own, choices, origin)?;
         if let Some(folder) = folder {
-            layers::anchor_path(&mut own, &["rheology", "file"], folder);
+            layers::anchor_path(&mut own, "rheology.file", folder);
+            if matches!(kind, Family::Chute | Family::Settle) {
+                layers::anchor_path(&mut own, "start", folder);
+            }
         }
         let mut inputs = Vec::new();
         inputs.extend(rheology_file::resolve(&mut own)?);
@@ -161,9 +194,25 @@ impl Scene {
         layers::check_choices(&set, choices, option)?;
         inputs.extend(rheology_file::resolve(&mut set)?);
         rheology_file::drop_stale_notes(&mut base, &own);
-        let mut table = layers::merge(base, own, drops);
+        if impact {
+            law_layers::lift(&mut own, origin)?;
+            law_layers::lift(&mut set, option)?;
+            law_layers::give_way(&mut base, &own);
+        }
+        let mut table = layers::merge(base, own.clone(), drops);
         rheology_file::drop_stale_notes(&mut table, &set);
-        let table = layers::merge(table, set, drops);
+        if impact {
+            law_layers::give_way(&mut table, &set);
+        }
+        let mut table = layers::merge(table, set.clone(), drops);
+        if lawful {
+            // A setting that chooses another law leaves a file's numbers behind without complaint.
+            if !law_layers::chooses(&set) {
+                law_layers::check_read(&table, &own, (impact, false), origin)?;
+            }
+            law_layers::check_read(&table, &set, (impact, true), option)?;
+            law_layers::drop_unread(&mut table, impact);
+        }
         check::check(&table, &schema, origin)?;
         check::require(&table, &schema, origin)?;
 
@@ -174,6 +223,7 @@ impl Scene {
         let mut resolved = toml::Table::new();
         resolved.insert("scene".into(), toml::Value::String(name.clone()));
         resolved.extend(body.to_table());
+        inputs.extend(body.start_file().map(PathBuf::from));
         let scene = Scene {
             name,
             body,
@@ -215,6 +265,8 @@ impl Scene {
             SceneBody::Incline(scene) => scene.check_together(origin),
             SceneBody::Bagnold(scene) => scene.check_together(origin),
             SceneBody::Impact(scene) => scene.check_together(origin),
+            SceneBody::Chute(scene) => scene.check_together(origin),
+            SceneBody::Settle(scene) => scene.check_together(origin),
         }
     }
 }
@@ -257,6 +309,8 @@ fn body(name: &str, table: &toml::Table) -> Result<SceneBody, String> {
         Family::Incline => SceneBody::Incline(table.try_into().map_err(plain)?),
         Family::Bagnold => SceneBody::Bagnold(table.try_into().map_err(plain)?),
         Family::Impact => SceneBody::Impact(table.try_into().map_err(plain)?),
+        Family::Chute => SceneBody::Chute(table.try_into().map_err(plain)?),
+        Family::Settle => SceneBody::Settle(table.try_into().map_err(plain)?),
     })
 }
 
@@ -271,12 +325,16 @@ enum Family {
     Incline,
     Bagnold,
     Impact,
+    Chute,
+    Settle,
 }
 
 fn family(name: &str) -> Family {
     match name {
         "bagnold" => Family::Bagnold,
         "two-spheres" | "sphere-on-plane" => Family::Impact,
+        "chute" => Family::Chute,
+        "settle" => Family::Settle,
         _ => Family::Incline,
     }
 }
@@ -290,9 +348,18 @@ fn alternatives(name: &str) -> &'static [&'static [&'static str]] {
             "contact.stiffness_from_speed",
         ]],
         Family::Bagnold => rheology_file::ALTERNATIVES,
-        Family::Impact => &[],
+        Family::Impact => &law::CHOICES,
+        Family::Chute | Family::Settle => &BED_CHOICES,
     }
 }
+
+/// Alternatives of the scenes of a bed: its length, and those of the law.
+const BED_CHOICES: [&[&str]; 4] = [
+    bed::LENGTH,
+    law::CHOICES[0],
+    law::CHOICES[1],
+    law::CHOICES[2],
+];
 
 /// The JSON Schema of one kind, without the key `scene`.
 fn body_schema(name: &str) -> Value {
@@ -300,6 +367,8 @@ fn body_schema(name: &str) -> Value {
         Family::Incline => schemars::schema_for!(InclineScene),
         Family::Bagnold => schemars::schema_for!(BagnoldScene),
         Family::Impact => schemars::schema_for!(ImpactScene),
+        Family::Chute => schemars::schema_for!(ChuteScene),
+        Family::Settle => schemars::schema_for!(SettleScene),
     };
     schema.to_value()
 }

@@ -1,23 +1,22 @@
 //! One impact: two spheres, or a sphere on the plane z = 0.
 
+use super::impact_scales;
 use super::step::{Step, choose};
 use super::{Findings, Under};
 use crate::cost::Cost;
 use crate::failure::Failure;
 use crate::progress::Bar;
-use crate::scene::{ImpactScene, RollingKeys, Scene};
+use crate::scene::{ImpactScene, RollingKeys, Scene, SceneError};
 use crate::summary::{Model, Quantity, Summary};
 use crate::table::Table;
 use colluvium_dem::{
-    ContactLaw, Domain, Grain, GrainSample, Hooke, Plane, Record, Setup, SetupError,
-    ShapeParameter, Simulation, Snapshot, TangentialSpring, Threads,
+    Cohesion, ContactLaw, Damping, Domain, Grain, GrainSample, Normal, Plane, Record, Setup,
+    SetupError, ShapeParameter, Simulation, Snapshot, Threads,
 };
 use nalgebra::Vector3;
-use std::f64::consts::PI;
 
 /// What one impact leaves out.
-pub const LEFT_OUT: [&str; 4] = [
-    "cohesion",
+pub const LEFT_OUT: [&str; 3] = [
     "bonds",
     "plasticity",
     "rotation about other axes at the start",
@@ -33,8 +32,13 @@ pub struct Impact {
     pub setup: Setup,
     /// m_1 m_2/(m_1 + m_2), or the sphere's mass against a plane (kg).
     pub reduced_mass: f64,
-    /// √(m_red (π² + ln² ε_n)/k_n) (s).
+    /// Duration of the contact (s): √(m_red (π² + ln² ε_n)/k_n) of a linear spring, else that of the
+    /// undamped contact.
     pub contact_time: f64,
+    /// Largest overlap without damping (m).
+    pub overlap: f64,
+    /// The law.
+    pub law: ContactLaw,
     /// Duration (s).
     pub duration: f64,
     /// Time step.
@@ -53,15 +57,18 @@ const MOST_STEPS: f64 = 1e9;
 
 /// Checks an impact before anything is written.
 pub(super) fn check(scene: &Scene, body: &ImpactScene) -> Result<(), Failure> {
-    let impact = prepare(body, scene.name == "two-spheres");
+    let impact = prepare(body, scene.name == "two-spheres")?;
     if !impact.step.seconds.is_normal() || !impact.contact_time.is_finite() {
         let range = format!(
             "such that the time step, here {:e} s, is a number a computer can hold",
             impact.step.seconds
         );
-        return Err(scene
-            .out_of_range("stiffness", body.stiffness, &range)
-            .into());
+        let modulus = body.contact.and_then(|c| c.youngs_modulus);
+        let (key, value) = match impact.law.normal {
+            Normal::Hooke(_) => ("stiffness", body.stiffness),
+            _ => ("contact.youngs_modulus", modulus.unwrap_or(f64::NAN)),
+        };
+        return Err(scene.out_of_range(key, value, &range).into());
     }
     let steps = impact.steps();
     if steps > MOST_STEPS {
@@ -94,21 +101,35 @@ pub fn shape(keys: Option<&RollingKeys>) -> Option<ShapeParameter> {
 }
 
 /// Sets an impact up; `pair` for two spheres, else the plane z = 0.
-pub fn prepare(scene: &ImpactScene, pair: bool) -> Impact {
-    let law = ContactLaw::linear(
-        Hooke::matched(scene.stiffness, scene.restitution),
-        TangentialSpring::matched(
-            scene.stiffness_ratio,
-            scene.tangential_restitution,
-            scene.friction,
-        ),
-        shape(scene.rolling.as_ref()),
-    );
+pub fn prepare(scene: &ImpactScene, pair: bool) -> Result<Impact, SceneError> {
+    let law = scene.law("contact")?;
     let mass = scene.mass();
     let reduced_mass = if pair { 0.5 * mass } else { mass };
-    let undamped = PI * (reduced_mass / scene.stiffness).sqrt();
-    let contact_time =
-        Hooke::matched(scene.stiffness, scene.restitution).contact_time(reduced_mass);
+    let reduced_radius = if pair {
+        0.5 * scene.radius
+    } else {
+        scene.radius
+    };
+    let struck = impact_scales::overlap(&law, reduced_mass, reduced_radius, scene.speed);
+    let overlap = struck.max(-scene.gap);
+    // A step resolves the swing at the deepest overlap; a linear spring has one swing.
+    let undamped = if overlap > 0.0 {
+        impact_scales::half_period(&law, reduced_mass, reduced_radius, overlap)
+    } else {
+        impact_scales::duration(&law, reduced_mass, reduced_radius, 0.0)
+    };
+    let contact_time = match &law.normal {
+        Normal::Hooke(hooke) => {
+            let damped = hooke.contact_time(reduced_mass);
+            // A dashpot of its own strength may be too strong for the spring to swing back.
+            if damped.is_finite() {
+                damped
+            } else {
+                2.0 * undamped
+            }
+        }
+        _ => impact_scales::duration(&law, reduced_mass, reduced_radius, scene.speed),
+    };
 
     let angle = scene.impact_degrees.to_radians();
     let (tangential, normal) = (scene.speed * angle.sin(), scene.speed * angle.cos());
@@ -141,8 +162,17 @@ pub fn prepare(scene: &ImpactScene, pair: bool) -> Impact {
         approach + 2.0 * contact_time
     };
     let reach = 20.0 * radius + scene.gap;
-    let step = choose(undamped, scene.steps_per_contact, &law, mass, radius);
-    Impact {
+    let step = choose(
+        undamped,
+        scene.steps_per_contact,
+        &law,
+        mass,
+        radius,
+        overlap,
+    );
+    Ok(Impact {
+        overlap,
+        law,
         setup: Setup {
             domain: Domain {
                 lower: Vector3::repeat(-reach),
@@ -160,7 +190,7 @@ pub fn prepare(scene: &ImpactScene, pair: bool) -> Impact {
         contact_time,
         duration,
         step,
-    }
+    })
 }
 
 /// What is read off while the spheres fly.
@@ -232,7 +262,7 @@ impl Watch {
 
 pub(super) fn run(scene: &ImpactScene, under: &mut Under) -> Result<Findings, Failure> {
     let pair = under.scene.name == "two-spheres";
-    let impact = prepare(scene, pair);
+    let impact = prepare(scene, pair)?;
     let timestep = impact.setup.timestep;
     let steps = impact.steps() as u64;
     let stride = (steps / scene.rows.max(1)).max(1);
@@ -300,14 +330,29 @@ pub(super) fn run(scene: &ImpactScene, under: &mut Under) -> Result<Findings, Fa
 
 /// What the scene does not name and is not computed.
 pub fn left_out(scene: &ImpactScene) -> Vec<String> {
-    let mut list = LEFT_OUT.map(String::from).to_vec();
-    if scene.rolling.is_none() {
-        list.push("rolling and twisting resistance".into());
-    }
+    let mut list = super::bed::left_out(scene.law_keys().parts(), &LEFT_OUT);
     if scene.gravity == 0.0 {
         list.push("gravity".into());
     }
     list
+}
+
+/// The restitution that the law is made for, and where that is said.
+fn matched(impact: &Impact) -> Option<(f64, &'static str)> {
+    if impact.law.cohesion != Cohesion::None {
+        return None;
+    }
+    match &impact.law.normal {
+        Normal::Hooke(hooke) => match hooke.damping {
+            Damping::Restitution(e) => Some((e, "scene key restitution")),
+            Damping::MassProportional(_) => Some((
+                hooke.restitution(impact.reduced_mass),
+                "exp(-γ τ/2) of the dashpot",
+            )),
+        },
+        Normal::Hertz(hertz) => Some((hertz.restitution, "scene key restitution")),
+        Normal::Viscoelastic(_) | Normal::Jkr(_) => None,
+    }
 }
 
 fn refused(error: SetupError) -> Failure {
@@ -391,16 +436,25 @@ fn describe(
     before: f64,
 ) {
     if let (Some(begin), Some(end)) = (watch.begin, watch.end) {
-        summary.put(
-            "restitution",
-            Quantity::new(-watch.speed_out / watch.speed_in, "1")
-                .against(scene.restitution, "scene key restitution"),
-        );
-        summary.put(
-            "contact_time",
-            Quantity::new(end - begin, "s")
-                .against(impact.contact_time, "√(m_red (π² + ln² ε_n)/k_n)"),
-        );
+        let restitution = Quantity::new(-watch.speed_out / watch.speed_in, "1");
+        let time = Quantity::new(end - begin, "s");
+        let (restitution, time) = match matched(impact) {
+            Some(wanted) => (
+                restitution.against(wanted.0, wanted.1),
+                match impact.law.normal {
+                    Normal::Hooke(_) => {
+                        time.against(impact.contact_time, "√(m_red (π² + ln² ε_n)/k_n)")
+                    }
+                    _ => time.from("from first to last touch"),
+                },
+            ),
+            None => (
+                restitution.from("follows from the law; no closed form here"),
+                time.from("from first to last touch"),
+            ),
+        };
+        summary.put("restitution", restitution);
+        summary.put("contact_time", time);
     } else {
         summary
             .remarks

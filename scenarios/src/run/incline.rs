@@ -65,6 +65,7 @@ pub fn step(scene: &InclineScene) -> Step {
         &law(scene),
         scene.mean_mass() * smallest.powi(3),
         scene.smallest_radius(),
+        0.0,
     )
 }
 
@@ -159,11 +160,7 @@ pub fn failure(error: InclineError) -> Failure {
 }
 
 pub(super) fn run(scene: &InclineScene, under: &mut Under) -> Result<Findings, Failure> {
-    let threads = if under.threads > 1 {
-        Threads::Rayon
-    } else {
-        Threads::Serial
-    };
+    let threads = under.threads_of_one_run();
     if under.resumed.is_none() {
         under.begin()?;
     }
@@ -207,7 +204,8 @@ pub(super) fn run(scene: &InclineScene, under: &mut Under) -> Result<Findings, F
     }
     bar.clear();
     let energy = run.simulation().energy();
-    let grains = grain_table(&mut run);
+    let mut snapshot = Snapshot::default();
+    run.simulation().snapshot(&mut snapshot);
     let momentum_error = run.simulation().momentum_error();
     let result = run.finish();
     let mut summary = Summary::begun(&under.scene.name, "run");
@@ -232,7 +230,7 @@ pub(super) fn run(scene: &InclineScene, under: &mut Under) -> Result<Findings, F
     Ok(Findings {
         summary,
         tables,
-        grains: Some(grains),
+        grains: Some(super::grain_table::of(&snapshot)),
     })
 }
 
@@ -407,38 +405,4 @@ pub fn points_table(results: &[InclineResult]) -> Table {
         .with("mu_zz_error", "1", column!(friction_zz_error))
         .with("phi", "1", column!(solid_fraction))
         .with("phi_error", "1", column!(solid_fraction_error))
-}
-
-/// Every grain at the end.
-fn grain_table(run: &mut InclineRun) -> Table {
-    let mut snapshot = Snapshot::default();
-    run.simulation().snapshot(&mut snapshot);
-    let mut grains = snapshot.grains;
-    grains.sort_by_key(|g| g.id);
-    let mut table = Table::new("grains")
-        .with("id", "1", grains.iter().map(|g| f64::from(g.id)).collect())
-        .with(
-            "fixed",
-            "1",
-            grains
-                .iter()
-                .map(|g| f64::from(u8::from(g.fixed)))
-                .collect(),
-        )
-        .with("radius", "m", grains.iter().map(|g| g.radius).collect());
-    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-        table = table
-            .with(name, "m", grains.iter().map(|g| g.position[axis]).collect())
-            .with(
-                &format!("v{name}"),
-                "m/s",
-                grains.iter().map(|g| g.velocity[axis]).collect(),
-            )
-            .with(
-                &format!("w{name}"),
-                "rad/s",
-                grains.iter().map(|g| g.spin[axis]).collect(),
-            );
-    }
-    table
 }

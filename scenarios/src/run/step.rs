@@ -16,17 +16,18 @@ pub struct Step {
 }
 
 /// The smaller of contact time over steps per contact, and a share of the stability limit of the
-/// smallest grain: a large β makes rolling springs faster than the contact.
+/// smallest grain at an overlap (m; a linear spring does not care): a large β makes rolling springs faster than the contact.
 pub fn choose(
     contact_time: f64,
     steps_per_contact: f64,
     law: &ContactLaw,
     smallest_mass: f64,
     smallest_radius: f64,
+    overlap: f64,
 ) -> Step {
     let contact = contact_time / steps_per_contact;
-    let stability =
-        SHARE_OF_STABILITY * timestep::stability_limit(law, smallest_mass, smallest_radius, 0.0);
+    let stability = SHARE_OF_STABILITY
+        * timestep::stability_limit(law, smallest_mass, smallest_radius, overlap);
     if contact <= stability {
         Step {
             seconds: contact,

@@ -86,6 +86,44 @@ pub enum SceneError {
         /// The other.
         second: String,
     },
+    /// Parts of a contact law that do not go together.
+    #[error(
+        "{file}: key `{key}` = \"{value}\" does not go with the other parts of the contact law: {reason}"
+    )]
+    Composition {
+        /// Where it was read.
+        file: String,
+        /// Dotted path.
+        key: String,
+        /// The part's name.
+        value: String,
+        /// Why the engine refuses it.
+        reason: String,
+    },
+    /// A key that the chosen contact law does not read.
+    #[error(
+        "{file}: key `{key}` = {value} is not read by this contact law ({law}); its keys: {reads}"
+    )]
+    Unread {
+        /// Where it was read.
+        file: String,
+        /// Dotted path.
+        key: String,
+        /// The value as written.
+        value: String,
+        /// The parts of the law.
+        law: String,
+        /// The keys it reads.
+        reads: String,
+    },
+    /// A start file that cannot be used.
+    #[error("key `start` = \"{path}\": {message}")]
+    Start {
+        /// The path as written.
+        path: String,
+        /// What is wrong with it, and what is allowed.
+        message: String,
+    },
     /// A setting that is not of the form `KEY=VALUE`.
     #[error("{option} {text}: wanted KEY=VALUE, as in `{option} slope_degrees=25`")]
     Setting {

@@ -1,6 +1,7 @@
 //! Keys of one impact: two spheres, or a sphere on a plane.
 
-use super::{LEAST_MASS, SceneError};
+use super::{LEAST_MASS, LawKeys, RollingKind, SceneError};
+use colluvium_dem::ContactLaw;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -56,7 +57,28 @@ pub struct ImpactScene {
     /// Rolling and twisting springs; leave the table out for none.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub rolling: Option<RollingKeys>,
+    /// Another contact law, or more of it; restitution, friction, stiffness and the ratio of
+    /// stiffnesses have their home above.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub contact: Option<LawKeys>,
 }
+
+/// Keys of `[contact]` that have their home at the top of an impact.
+pub const AT_THE_TOP: [&str; 5] = [
+    "stiffness",
+    "restitution",
+    "friction",
+    "stiffness_ratio",
+    "tangential_restitution",
+];
+
+/// A key at the top, and the key of `[contact]` that takes its place.
+pub const INSTEAD: [(&str, &str); 4] = [
+    ("restitution", "damping_rate"),
+    ("tangential_restitution", "tangential_damping_rate"),
+    ("stiffness_ratio", "tangential_stiffness"),
+    ("rolling", "rolling"),
+];
 
 /// Rolling and twisting springs with a shape parameter.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -79,7 +101,40 @@ impl ImpactScene {
         self.density * 4.0 / 3.0 * std::f64::consts::PI * self.radius.powi(3)
     }
 
+    /// The law as one section: the keys at the top, and what `[contact]` puts in their place.
+    pub fn law_keys(&self) -> LawKeys {
+        let given = self.contact.unwrap_or_default();
+        let mut keys = LawKeys {
+            stiffness: Some(self.stiffness),
+            restitution: Some(self.restitution),
+            friction: Some(self.friction),
+            stiffness_ratio: given
+                .tangential_stiffness
+                .is_none()
+                .then_some(self.stiffness_ratio),
+            tangential_restitution: Some(self.tangential_restitution),
+            ..given
+        };
+        // Over an elastic contact a ratio of stiffnesses has no meaning; it is only the default here.
+        if keys.parts().normal != super::NormalKind::Hooke {
+            keys.stiffness_ratio = None;
+        }
+        if let Some(rolling) = self.rolling {
+            keys.rolling = Some(RollingKind::Shape);
+            keys.beta = Some(rolling.beta);
+            keys.rolling_friction = Some(rolling.rolling_friction);
+            keys.twisting_friction = Some(rolling.twisting_friction);
+        }
+        keys
+    }
+
+    /// The contact law.
+    pub fn law(&self, origin: &str) -> Result<ContactLaw, SceneError> {
+        self.law_keys().law(origin)
+    }
+
     pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {
+        self.law(origin)?;
         if self.mass() <= LEAST_MASS {
             // Whichever of the two is the slip.
             let (key, value) = if self.radius < 1e-20 {

@@ -101,7 +101,8 @@ pub fn get<'a>(table: &'a Table, key: &str) -> Option<&'a Value> {
     }
 }
 
-fn remove(table: &mut Table, key: &str) {
+/// Takes away what is at a dotted path.
+pub fn remove(table: &mut Table, key: &str) {
     match key.split_once('.') {
         None => {
             table.remove(key);
@@ -153,12 +154,20 @@ fn lay(base: &mut Table, upper: Table) {
     }
 }
 
-/// Makes a relative path in a scene file relative to that file's folder.
-pub fn anchor_path(table: &mut Table, keys: &[&str; 2], folder: &Path) {
-    if let Some(Value::Table(inner)) = table.get_mut(keys[0])
-        && let Some(Value::String(path)) = inner.get_mut(keys[1])
-        && Path::new(path.as_str()).is_relative()
-    {
-        *path = folder.join(path.as_str()).display().to_string();
+/// Makes a relative path at a dotted key of a scene file relative to that file's folder.
+pub fn anchor_path(table: &mut Table, key: &str, folder: &Path) {
+    match key.split_once('.') {
+        Some((head, rest)) => {
+            if let Some(Value::Table(inner)) = table.get_mut(head) {
+                anchor_path(inner, rest, folder);
+            }
+        }
+        None => {
+            if let Some(Value::String(path)) = table.get_mut(key)
+                && Path::new(path.as_str()).is_relative()
+            {
+                *path = folder.join(path.as_str()).display().to_string();
+            }
+        }
     }
 }

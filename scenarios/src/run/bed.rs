@@ -1,0 +1,374 @@
+//! A bed of grains from its start through a given number of steps: what `chute` and `settle` share.
+
+use super::impact_scales;
+use super::{Findings, Under};
+use crate::cost::Cost;
+use crate::failure::Failure;
+use crate::progress::Bar;
+use crate::scene::{CohesionKind, Pace, Parts, RollingKind, Scene, SceneError, TangentialKind};
+use crate::start_file::{self, StartError};
+use crate::summary::{Model, Quantity, Summary};
+use crate::table::Table;
+use colluvium_dem::{
+    ContactLaw, Grain, Partner, Record, Setup, SetupError, Simulation, Snapshot, timestep,
+};
+use std::path::Path;
+
+/// Steps between two looks at the clock.
+const STEPS_PER_LOOK: u64 = 50;
+
+/// Columns of `energy.csv` with their units.
+const COLUMNS: [(&str, &str); 13] = [
+    ("t", "s"),
+    ("step", "1"),
+    ("translation", "J"),
+    ("rotation", "J"),
+    ("kinetic_energy", "J"),
+    ("normal", "J"),
+    ("tangential", "J"),
+    ("rolling", "J"),
+    ("twisting", "J"),
+    ("cohesion", "J"),
+    ("height", "m"),
+    ("velocity", "m/s"),
+    ("contacts", "1"),
+];
+
+/// Numbers of a row, in the order of [`COLUMNS`].
+pub type Row = [f64; COLUMNS.len()];
+
+/// Column of the step, the kinetic energies and the centre of mass.
+pub const STEP: usize = 1;
+/// See [`STEP`].
+pub const TRANSLATION: usize = 2;
+/// See [`STEP`].
+pub const KINETIC: usize = 4;
+/// See [`STEP`].
+pub const HEIGHT: usize = 10;
+
+/// A bed ready to run.
+#[derive(Debug)]
+pub struct Bed {
+    /// The start.
+    pub setup: Setup,
+    /// Law of the grains, or of the parcels that stand for them.
+    pub law: ContactLaw,
+    /// Steps and their length.
+    pub pace: Pace,
+    /// Further steps at which a row is written.
+    pub marks: &'static [u64],
+    /// Height of the floor, or of the tops of the base (m).
+    pub floor: f64,
+    /// Area of the floor (m²).
+    pub area: f64,
+    /// Largest speed to be expected (m/s).
+    pub speed: f64,
+}
+
+/// A bed that has run.
+#[derive(Debug)]
+pub struct Ran {
+    /// Rows of `energy.csv`.
+    pub rows: Vec<Row>,
+    /// The state at the end.
+    pub simulation: Simulation,
+    /// Grains and contacts at the end.
+    pub snapshot: Snapshot,
+}
+
+/// Time step and what stands against a longer one.
+#[derive(Clone, Copy, Debug)]
+pub struct Limit {
+    /// Stability limit of the fastest spring of the lightest free grain (s).
+    pub stability: f64,
+    /// Half a period of the same grain's contact with an equal one (s).
+    pub half_period: f64,
+    /// Overlap it was taken at, over the radius.
+    pub overlap: f64,
+}
+
+impl Bed {
+    /// What limits the time step, at the overlap of the fastest impact to be expected.
+    pub fn limit(&self) -> Limit {
+        let free = self.setup.grains.iter().filter(|g| !g.fixed);
+        let lightest = free.min_by(|a, b| a.mass().total_cmp(&b.mass()));
+        let (mass, radius) = lightest.map_or((1.0, 1.0), |g| (g.mass(), g.radius));
+        let overlap = impact_scales::overlap(&self.law, 0.5 * mass, 0.5 * radius, self.speed);
+        Limit {
+            stability: timestep::stability_limit(&self.law, mass, radius, overlap),
+            half_period: impact_scales::half_period(&self.law, 0.5 * mass, 0.5 * radius, overlap),
+            overlap: overlap / radius,
+        }
+    }
+
+    /// Free grains.
+    pub fn free(&self) -> usize {
+        self.setup.grains.iter().filter(|g| !g.fixed).count()
+    }
+}
+
+/// The grains of a start file, or why there are none.
+pub fn read_start(path: &str) -> Result<Vec<Grain>, SceneError> {
+    start_file::read(Path::new(path)).map_err(|error| refused_start(path, error.to_string()))
+}
+
+/// The error that a start file cannot be used.
+pub fn refused_start(path: &str, message: String) -> SceneError {
+    SceneError::Start {
+        path: path.to_owned(),
+        message: format!(
+            "{message}; allowed: a CSV file, gzipped or not, with the columns type, radius, density, x, y, z, vx, vy, vz and omegax, omegay, omegaz, of which the type and the spins may be left out"
+        ),
+    }
+}
+
+/// The same for the bundled start, which the program's own tests have read.
+pub fn bundled(read: Result<Vec<Grain>, StartError>) -> Result<Vec<Grain>, Failure> {
+    read.map_err(|error| Failure::Run(error.to_string()))
+}
+
+/// Checks a bed before anything is written.
+pub fn check(scene: &Scene, bed: Bed, timestep_key: f64) -> Result<(), Failure> {
+    if bed.free() == 0 {
+        let path = scene.body.start_file().unwrap_or_default();
+        return Err(refused_start(path, "all grains are frozen".into()).into());
+    }
+    let limit = bed.limit();
+    if bed.pace.timestep > limit.stability {
+        let range = format!(
+            "(0, {:.3e}): above it the fastest spring of the lightest grain is unstable",
+            limit.stability * timestep_key / bed.pace.timestep
+        );
+        return Err(scene.out_of_range("timestep", timestep_key, &range).into());
+    }
+    Simulation::new(bed.setup)
+        .map(drop)
+        .map_err(|error| match scene.body.start_file() {
+            Some(path) => refused_start(path, error.to_string()).into(),
+            None => Failure::Input(format!("{}: {error}", scene.origin)),
+        })
+}
+
+/// Runs a bed.
+pub fn run(bed: &Bed, under: &mut Under) -> Result<Ran, Failure> {
+    let refused = |error: SetupError| Failure::Input(error.to_string());
+    let setup = bed.setup.clone();
+    let (mut simulation, mut rows) = match &under.resumed {
+        Some(saved) => (
+            Simulation::resume(setup, &saved.record).map_err(refused)?,
+            restore(&saved.record).map_err(Failure::Input)?,
+        ),
+        None => (Simulation::new(setup).map_err(refused)?, Vec::new()),
+    };
+    under.begin()?;
+    let bar = Bar::new(&under.scene.name);
+    let mut snapshot = Snapshot::default();
+    if simulation.steps_done() == 0 {
+        rows.push(look(&mut simulation, &mut snapshot, bed.floor));
+    }
+    while simulation.steps_done() < bed.pace.steps {
+        let done = simulation.steps_done();
+        let row = next_row(done, bed);
+        let next = row.min(done + STEPS_PER_LOOK);
+        simulation
+            .advance(next - done)
+            .map_err(|error| Failure::Run(error.to_string()))?;
+        if next == row {
+            rows.push(look(&mut simulation, &mut snapshot, bed.floor));
+        }
+        bar.set(next as f64 / bed.pace.steps as f64);
+        under.checkpoint("steps", || {
+            let mut record = simulation.checkpoint();
+            let flat = rows.iter().flatten().copied().collect();
+            record.numbers.insert("watch/rows".into(), flat);
+            record
+        })?;
+    }
+    bar.clear();
+    simulation.snapshot(&mut snapshot);
+    Ok(Ran {
+        rows,
+        simulation,
+        snapshot,
+    })
+}
+
+/// The step at which the next row is written.
+fn next_row(done: u64, bed: &Bed) -> u64 {
+    let regular = (done / bed.pace.record_every + 1) * bed.pace.record_every;
+    let marks = bed.marks.iter().copied().filter(|&mark| mark > done);
+    marks.fold(regular.min(bed.pace.steps), u64::min)
+}
+
+fn restore(record: &Record) -> Result<Vec<Row>, String> {
+    let flat = record.numbers("watch/rows")?;
+    let rows = flat.chunks(COLUMNS.len()).map(|row| {
+        row.try_into().map_err(|_| {
+            format!(
+                "array `watch/rows` must have rows of {} numbers",
+                COLUMNS.len()
+            )
+        })
+    });
+    rows.collect()
+}
+
+fn look(simulation: &mut Simulation, snapshot: &mut Snapshot, floor: f64) -> Row {
+    simulation.snapshot(snapshot);
+    let energy = simulation.energy();
+    let mut mass = 0.0;
+    let (mut height, mut velocity) = (0.0, 0.0);
+    for grain in snapshot.grains.iter().filter(|g| !g.fixed) {
+        mass += grain.mass;
+        height += grain.mass * grain.position.z;
+        velocity += grain.mass * grain.velocity.x;
+    }
+    [
+        simulation.time(),
+        simulation.steps_done() as f64,
+        energy.translation,
+        energy.rotation,
+        energy.kinetic(),
+        energy.normal,
+        energy.tangential,
+        energy.rolling,
+        energy.twisting,
+        energy.cohesion,
+        height / mass - floor,
+        velocity / mass,
+        snapshot.contacts.len() as f64,
+    ]
+}
+
+/// What every bed reports.
+pub fn findings(bed: &Bed, mut ran: Ran, left_out: Vec<String>, under: &Under) -> Findings {
+    let simulation = &mut ran.simulation;
+    let grains = simulation.grain_count() as u64;
+    let mut summary = Summary::begun(&under.scene.name, "run");
+    let limit = bed.limit();
+    summary.model = Model {
+        grains,
+        cells: 0,
+        dt_s: bed.pace.timestep,
+        dt_limit: format!(
+            "given: {:.1} steps in half a period of the lightest grain's contact, {:.0} % of its stability limit",
+            limit.half_period / bed.pace.timestep,
+            100.0 * bed.pace.timestep / limit.stability
+        ),
+        left_out,
+    };
+    summary.cost = Cost::measured(under.wall_s(), under.threads, bed.pace.steps * grains, 0);
+    summary.state_hash = simulation.state_hash();
+    summary.ledger.momentum_relative = Some(simulation.momentum_error());
+    let energy = simulation.energy();
+    for (name, value) in [
+        ("translation_J", energy.translation),
+        ("rotation_J", energy.rotation),
+        ("elastic_J", energy.elastic()),
+    ] {
+        summary.ledger.energy.insert(name.into(), value);
+    }
+    let last = ran
+        .rows
+        .last()
+        .copied()
+        .unwrap_or([f64::NAN; COLUMNS.len()]);
+    summary.put(
+        "kinetic_energy",
+        Quantity::new(last[KINETIC], "J").from("at the end, translation and rotation"),
+    );
+    summary.put(
+        "centre_of_mass_height",
+        Quantity::new(last[HEIGHT], "m")
+            .from("at the end, above the floor or the tops of the base"),
+    );
+    summary.put(
+        "solid_fraction",
+        Quantity::new(solid_fraction(&ran.snapshot, bed, last[HEIGHT]), "1")
+            .from("at the end, between a quarter and three quarters of the depth"),
+    );
+    summary.put(
+        "coordination",
+        Quantity::new(coordination(&ran.snapshot), "1").from("contacts of a free grain at the end"),
+    );
+    summary.put(
+        "largest_overlap",
+        Quantity::new(ran.simulation.largest_overlap(), "R"),
+    );
+    let mut table = Table::new("energy");
+    for (n, (name, unit)) in COLUMNS.into_iter().enumerate() {
+        table = table.with(name, unit, ran.rows.iter().map(|row| row[n]).collect());
+    }
+    Findings {
+        summary,
+        tables: vec![table],
+        grains: Some(super::grain_table::of(&ran.snapshot)),
+    }
+}
+
+/// Volume of spheres in the middle half of the depth over the volume of that layer; the depth is
+/// twice the height of the centre of mass.
+fn solid_fraction(snapshot: &Snapshot, bed: &Bed, height: f64) -> f64 {
+    let (low, high) = (bed.floor + 0.5 * height, bed.floor + 1.5 * height);
+    let solid: f64 = snapshot
+        .grains
+        .iter()
+        .map(|g| below(high - g.position.z, g.radius) - below(low - g.position.z, g.radius))
+        .sum();
+    solid / (bed.area * (high - low))
+}
+
+/// Volume of a sphere below a plane `z` above its centre.
+fn below(z: f64, radius: f64) -> f64 {
+    let z = z.clamp(-radius, radius);
+    std::f64::consts::PI * (radius * radius * z - z.powi(3) / 3.0 + 2.0 / 3.0 * radius.powi(3))
+}
+
+/// Contacts of a free grain, those with walls and the base included.
+fn coordination(snapshot: &Snapshot) -> f64 {
+    let free = |i: usize| usize::from(!snapshot.grains[i].fixed);
+    let touches: usize = snapshot
+        .contacts
+        .iter()
+        .map(|contact| {
+            free(contact.grain)
+                + match contact.partner {
+                    Partner::Grain(j) => free(j),
+                    Partner::Plane(_) => 0,
+                }
+        })
+        .sum();
+    let grains: usize = (0..snapshot.grains.len()).map(free).sum();
+    touches as f64 / grains as f64
+}
+
+/// Physics that the parts of a law do not hold.
+pub fn left_out(parts: Parts, also: &[&str]) -> Vec<String> {
+    let mut list: Vec<String> = also.iter().map(|&s| s.to_owned()).collect();
+    if parts.tangential == TangentialKind::None {
+        list.push("friction".into());
+    }
+    if parts.rolling == RollingKind::None {
+        list.push("rolling and twisting resistance".into());
+    }
+    // JKR contacts adhere by themselves.
+    if parts.cohesion == CohesionKind::None && parts.normal != crate::scene::NormalKind::Jkr {
+        list.push("cohesion".into());
+    }
+    list
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_sphere_is_cut_by_a_plane() {
+        let whole = 4.0 / 3.0 * std::f64::consts::PI * 8.0;
+        assert_eq!(below(-3.0, 2.0), 0.0);
+        assert!((below(9.0, 2.0) / whole - 1.0).abs() < 1e-15);
+        assert!((below(0.0, 2.0) / whole - 0.5).abs() < 1e-15);
+        // A cap of height h: π h² (3 R - h)/3.
+        assert!((below(-1.0, 2.0) - std::f64::consts::PI * 5.0 / 3.0).abs() < 1e-12);
+    }
+}
