@@ -83,8 +83,12 @@ impl Comparison {
         };
         if reference.is_none() && !has_exact_solution(&scene) {
             return Err(Failure::Input(format!(
-                "pareto {}: this scene has no exact solution; say what to compare with, as in `--reference timestep.steps_per_contact=100`",
-                scene.name
+                "pareto {}: this scene has no exact solution; say what to compare with, as in `--reference {}`",
+                scene.name,
+                match scene.body {
+                    SceneBody::Incline(_) => "timestep.steps_per_contact=100",
+                    _ => "timestep=1e-5",
+                }
             )));
         }
         Ok(Comparison {

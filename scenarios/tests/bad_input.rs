@@ -308,6 +308,115 @@ const CASES: &[(&[&str], &[&str])] = &[
         &["run", "mine/scene.toml", "--out", "mine"],
         &["--out", "mine", "not empty"],
     ),
+    (
+        &["run", "chute", "--set", "scale=1.5"],
+        &["scale", "1.5", "whole number"],
+    ),
+    (
+        &["run", "chute", "--set", "timestep=0.01"],
+        &["timestep", "0.01", "(0, ", "unstable"],
+    ),
+    (
+        &["run", "chute", "--set", "steps=10", "--set", "duration=1"],
+        &["steps", "duration", "exclude"],
+    ),
+    (
+        &["run", "chute", "--set", "duration=1e7"],
+        &["duration", "10000000", "1e9 steps"],
+    ),
+    (
+        &["run", "chute", "--set", "start=nowhere.csv"],
+        &["start", "nowhere.csv", "allowed"],
+    ),
+    (
+        &["run", "chute", "--set", "coarse_graining=0.5"],
+        &["coarse_graining", "0.5", "[1, 10]"],
+    ),
+    (
+        &["run", "chute", "--set", "contact.frction=1"],
+        &["contact.frction", "`contact.friction`"],
+    ),
+    (
+        &["run", "chute", "--set", "contact.normal=hertzian"],
+        &[
+            "contact.normal",
+            "hertzian",
+            "hooke, hertz, viscoelastic, jkr",
+        ],
+    ),
+    (
+        &["run", "chute", "--set", "contact.normal=hertz"],
+        &["contact.youngs_modulus", "missing", "Pa"],
+    ),
+    (
+        &["run", "chute", "--set", "contact.tangential=mindlin"],
+        &["chute", "contact.tangential", "mindlin", "Hertz"],
+    ),
+    (
+        &["run", "chute", "--set", "contact.rolling=jkr"],
+        &["contact.rolling", "jkr", "JKR normal law"],
+    ),
+    (
+        &["run", "chute", "--set", "contact.dissipation=1e-5"],
+        &["contact.dissipation", "not read", "hooke", "stiffness"],
+    ),
+    (
+        &[
+            "run",
+            "chute",
+            "--set",
+            "contact.restitution=0.5",
+            "--set",
+            "contact.damping_rate=1",
+        ],
+        &["contact.restitution", "contact.damping_rate", "exclude"],
+    ),
+    (
+        &["run", "settle", "--set", "floor.width=0.004"],
+        &["floor.width", "0.004", "at least 0.0063"],
+    ),
+    (
+        &["run", "settle", "--set", "contact.poissons_ratio=0.6"],
+        &["contact.poissons_ratio", "0.6", "(-1, 0.5]"],
+    ),
+    (
+        &["run", "settle", "--set", "contact.tangential=linear"],
+        &["contact.tangential_stiffness", "missing", "N/m"],
+    ),
+    (
+        &[
+            "run",
+            "settle",
+            "--set",
+            "grains.count=10000000",
+            "--set",
+            "scale=50",
+        ],
+        &["scale", "2e7 grains"],
+    ),
+    (
+        &["run", "settle", "--set", "timestep=1e-3"],
+        &["timestep", "0.001", "unstable"],
+    ),
+    (
+        &[
+            "run",
+            "two-spheres",
+            "--set",
+            "friction=0.2",
+            "--set",
+            "contact.friction=0.3",
+        ],
+        &["friction", "contact.friction", "exclude"],
+    ),
+    (
+        &["run", "two-spheres", "--set", "contact.cohesion=dmt"],
+        &["two-spheres", "contact.work_of_adhesion", "missing"],
+    ),
+    (
+        &["pareto", "chute", "--vary", "timestep=1e-4,2e-4"],
+        &["chute", "--reference"],
+    ),
 ];
 
 #[test]
