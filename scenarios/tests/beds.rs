@@ -206,7 +206,7 @@ fn every_law_of_the_engine_has_a_name() {
     let linear = "contact.tangential=linear contact.tangential_stiffness=1e4";
     let viscous = "contact.normal=viscoelastic contact.dissipation=1e-5";
     let hertz = "contact.normal=hertz";
-    let jkr = "contact.normal=jkr contact.surface_energy=0.1 contact.damping_rate=1e5 contact.critical_rolling=1e-9";
+    let jkr = "contact.normal=jkr contact.surface_energy=0.1 contact.damping_rate=1e3 contact.critical_rolling=1e-9";
     let laws = [
         String::new(),
         "contact.tangential=none".into(),

@@ -32,12 +32,28 @@ fn pareto(table: &Table) -> Markup {
         .with("", Mark::Line, 0, table.pairs("wall_s", "error"))
         .with("runs", Mark::Dots, 0, table.pairs("wall_s", "error"));
     (plot.x_log, plot.y_log) = (true, true);
+    // Where several observables are compared, the largest error hides the others.
+    let parts = table
+        .columns
+        .iter()
+        .filter(|c| c.name.starts_with("error_"));
+    for (n, part) in parts.enumerate() {
+        let label = part.name.trim_start_matches("error_").replace('_', " ");
+        plot = plot.with(
+            &label,
+            Mark::Dashes,
+            n + 2,
+            table.pairs("wall_s", &part.name),
+        );
+    }
     let key = table.columns.first().map_or("", |c| c.name.as_str());
     let mut by_key = Plot::new(key, "relative error")
         .with("", Mark::Line, 1, table.pairs(key, "error"))
         .with("runs", Mark::Dots, 1, table.pairs(key, "error"));
     let points = table.pairs(key, "error");
-    if let Some((x, y)) = points.first().copied().filter(|p| p.0 > 0.0) {
+    // A guide for keys that refine; others, such as a time step, coarsen as they grow.
+    let refines = table.column("order").iter().any(|order| *order > 0.0);
+    if let Some((x, y)) = points.first().copied().filter(|p| p.0 > 0.0 && refines) {
         let slope = points
             .iter()
             .map(|p| (p.0, y * (x / p.0).powi(2)))

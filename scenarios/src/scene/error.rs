@@ -101,9 +101,7 @@ pub enum SceneError {
         reason: String,
     },
     /// A key that the chosen contact law does not read.
-    #[error(
-        "{file}: key `{key}` = {value} is not read by this contact law ({law}); its keys: {reads}"
-    )]
+    #[error("{file}: key `{key}` = {value} is not read by this contact law: {law}")]
     Unread {
         /// Where it was read.
         file: String,
@@ -111,10 +109,8 @@ pub enum SceneError {
         key: String,
         /// The value as written.
         value: String,
-        /// The parts of the law.
+        /// The parts of the law, and the keys it reads.
         law: String,
-        /// The keys it reads.
-        reads: String,
     },
     /// A start file that cannot be used.
     #[error("key `start` = \"{path}\": {message}")]

@@ -92,13 +92,13 @@ pub fn check_read(
             key,
             value: value.to_string(),
             law: format!(
-                "normal {}, tangential {}, rolling {}, cohesion {}",
+                "normal {}, tangential {}, rolling {}, cohesion {}; its keys: {}",
                 parts.normal.word(),
                 parts.tangential.word(),
                 parts.rolling.word(),
-                parts.cohesion.word()
+                parts.cohesion.word(),
+                numbers.join(", ")
             ),
-            reads: numbers.join(", "),
         })
     };
     if let Some(Value::Table(contact)) = layer.get("contact") {
