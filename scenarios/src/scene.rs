@@ -197,6 +197,7 @@ impl Scene {
         if impact {
             law_layers::lift(&mut own, origin)?;
             law_layers::lift(&mut set, option)?;
+            law_layers::check_settings(&set, option)?;
             law_layers::give_way(&mut base, &own);
         }
         let mut table = layers::merge(base, own.clone(), drops);

@@ -9,14 +9,8 @@ use super::law::KINDS;
 use super::{ImpactScene, LawKeys, SceneError, layers};
 use toml::{Table, Value};
 
-/// Moves keys of an impact's `[contact]` to their home at the top; those of one meaning exclude
-/// each other.
+/// Moves keys of an impact's `[contact]` to their home at the top.
 pub fn lift(layer: &mut Table, file: &str) -> Result<(), SceneError> {
-    let conflict = |first: &str, second: &str| SceneError::Conflict {
-        file: file.to_owned(),
-        first: first.to_owned(),
-        second: second.to_owned(),
-    };
     for key in AT_THE_TOP {
         let Some(Value::Table(contact)) = layer.get_mut("contact") else {
             break;
@@ -25,14 +19,28 @@ pub fn lift(layer: &mut Table, file: &str) -> Result<(), SceneError> {
             continue;
         };
         if layer.contains_key(key) {
-            return Err(conflict(key, &format!("contact.{key}")));
+            return Err(SceneError::Conflict {
+                file: file.to_owned(),
+                first: key.to_owned(),
+                second: format!("contact.{key}"),
+            });
         }
         layer.insert(key.to_owned(), value);
     }
+    Ok(())
+}
+
+/// Settings of one meaning exclude each other. A file may have both: the keys at the top always have
+/// a value, and what `[contact]` puts in their place goes before them.
+pub fn check_settings(set: &Table, option: &str) -> Result<(), SceneError> {
     for (top, inside) in INSTEAD {
         let inside = format!("contact.{inside}");
-        if layer.contains_key(top) && layers::get(layer, &inside).is_some() {
-            return Err(conflict(top, &inside));
+        if set.contains_key(top) && layers::get(set, &inside).is_some() {
+            return Err(SceneError::Conflict {
+                file: option.to_owned(),
+                first: top.to_owned(),
+                second: inside,
+            });
         }
     }
     Ok(())
