@@ -346,7 +346,7 @@ const CASES: &[(&[&str], &[&str])] = &[
     ),
     (
         &["run", "chute", "--set", "contact.normal=hertz"],
-        &["contact.youngs_modulus", "missing", "Pa"],
+        &["contact.restitution", "missing", "in [0.01, 1]"],
     ),
     (
         &["run", "chute", "--set", "contact.tangential=mindlin"],
