@@ -7,6 +7,7 @@ use crate::contact::{
 use crate::domain::Domain;
 use crate::grains::Grain;
 use crate::planes::Plane;
+use crate::timestep::{self, Choice, Conditions, Limit, Pair, Shares};
 use nalgebra::Vector3;
 
 /// Whether a step is shared out over threads. The results are the same bits.
@@ -63,6 +64,22 @@ pub enum SetupError {
         length: f64,
         /// What it must be (m).
         least: f64,
+    },
+    /// The step is longer than one contact of the stiffest pair allows.
+    #[error(
+        "timestep = {timestep:e} s: must be below {below:.4e} s (limit: {limit}, {pair}); {would_do:.3e} s would do"
+    )]
+    Unstable {
+        /// The step (s).
+        timestep: f64,
+        /// Where one contact blows up (s).
+        below: f64,
+        /// What does.
+        limit: &'static str,
+        /// For whom.
+        pair: Pair,
+        /// The step that the limits allow (s).
+        would_do: f64,
     },
     /// Parts of a law that do not go together.
     #[error("contact: {0}")]
@@ -243,6 +260,46 @@ impl Setup {
         }
         check_box(&self.domain, largest, skin)?;
         Ok(law)
+    }
+
+    /// The limits of the step for these grains, walls and laws, and the step they allow.
+    pub fn choose_step(
+        &self,
+        conditions: &Conditions,
+        shares: &Shares,
+    ) -> Result<Choice, SetupError> {
+        let laws = LawTable::new(&self.law)?;
+        for grain in &self.grains {
+            known_material(grain.material, laws.materials())?;
+        }
+        for plane in &self.planes {
+            known_material(plane.material, laws.materials())?;
+        }
+        let walls: Vec<u16> = self.planes.iter().map(|p| p.material).collect();
+        let limits = timestep::limits(&self.grains, &walls, &laws, conditions, shares);
+        Ok(timestep::choose(limits, shares.safety))
+    }
+
+    /// Refuses a step beyond which one contact of the stiffest pair blows up, whatever its accuracy.
+    ///
+    /// Not part of [`crate::Simulation::new`]: where a pair never touches, its limit does not matter.
+    pub fn check_timestep(&self, conditions: &Conditions) -> Result<(), SetupError> {
+        let choice = self.choose_step(conditions, &Shares::default())?;
+        match choice.hard() {
+            Some(&Limit {
+                name,
+                seconds,
+                pair,
+                ..
+            }) if self.timestep >= seconds => Err(SetupError::Unstable {
+                timestep: self.timestep,
+                below: seconds,
+                limit: name,
+                pair,
+                would_do: choice.seconds,
+            }),
+            _ => Ok(()),
+        }
     }
 }
 

@@ -5,7 +5,7 @@ use crate::contact::{ContactLaw, HISTORY_MAX, Interaction, LawTable, Step};
 use crate::contacts::Touching;
 use crate::domain::{Domain, Images};
 use crate::forces::{self, Field};
-use crate::grains::Grains;
+use crate::grains::{Grains, vector};
 use crate::ledger::EnergyLedger;
 use crate::motion::Motion;
 use crate::neighbours::Neighbours;
@@ -15,6 +15,7 @@ use crate::reach::{Making, Reach};
 use crate::setup::{Setup, SetupError, Threads};
 use crate::snapshot::GrainSample;
 use crate::sweep::{self, Moved, Pass, Sweep};
+use crate::timestep::{self, Body, Classes, Conditions, Remedy, Shares};
 use nalgebra::Vector3;
 use std::sync::Arc;
 
@@ -24,7 +25,7 @@ pub enum Diverged {
     /// A position is no longer a number.
     #[error(
         "grain {grain} has left the range of numbers at t = {time:e} s: the time step of \
-         {timestep:e} s is too long for the stiffness and speeds of this scene"
+         {timestep:e} s is too long for the stiffness and speeds of this scene; {remedy}"
     )]
     Escape {
         /// Number of the grain.
@@ -33,11 +34,13 @@ pub enum Diverged {
         time: f64,
         /// The step (s).
         timestep: f64,
+        /// A step that would do.
+        remedy: Remedy,
     },
     /// Grains have run through each other.
     #[error(
         "grains overlapped by {overlap:.2} of their radius before t = {time:e} s: the time step of \
-         {timestep:e} s is too long, or the grains are too soft for their speeds"
+         {timestep:e} s is too long, or the grains are too soft for their speeds; {remedy}"
     )]
     Overlap {
         /// Overlap over the harmonic mean radius.
@@ -46,11 +49,13 @@ pub enum Diverged {
         time: f64,
         /// The step (s).
         timestep: f64,
+        /// A step that would do.
+        remedy: Remedy,
     },
     /// Grains move against each other by more than the search can follow.
     #[error(
         "grains approached each other by more than {skin:e} m in the one step before t = {time:e} s: \
-         the time step of {timestep:e} s is too long for their speeds"
+         the time step of {timestep:e} s is too long for their speeds; {remedy}"
     )]
     Leap {
         /// The list's skin (m).
@@ -59,11 +64,16 @@ pub enum Diverged {
         time: f64,
         /// The step (s).
         timestep: f64,
+        /// A step that would do.
+        remedy: Remedy,
     },
 }
 
 /// An overlap, over the harmonic mean radius, that no run of ours means: grains half way through.
 const RUN_THROUGH: f64 = 1.0;
+
+/// Overlap over the harmonic mean radius for which a failed run's better step is computed.
+const FAILING_OVERLAP: f64 = 0.1;
 
 /// Skin of the Verlet list in smallest-grain diameters, chosen by measurement on the inclined flow.
 const SKIN: f64 = 0.3;
@@ -405,6 +415,7 @@ impl Simulation {
                     skin: self.skin,
                     time: self.time(),
                     timestep: self.timestep,
+                    remedy: self.remedy(true),
                 });
             }
             self.rebuild();
@@ -421,6 +432,7 @@ impl Simulation {
                 overlap: self.deepest,
                 time,
                 timestep,
+                remedy: self.remedy(false),
             });
         }
         let n = self.grains.len();
@@ -431,7 +443,42 @@ impl Simulation {
                 grain: self.grains.id[i],
                 time,
                 timestep,
+                remedy: self.remedy(false),
             }),
+        }
+    }
+
+    /// A step that would do for these grains: that of contacts under a large overlap, and in a `leap`
+    /// that of the speeds, unless the contacts themselves have blown up.
+    fn remedy(&self, leap: bool) -> Remedy {
+        let n = self.grains.len();
+        let bodies = (0..n).map(|i| Body {
+            material: self.grains.material[i],
+            radius: self.grains.place[i][3],
+            mass: self.grains.mass[i],
+            fixed: self.grains.is_fixed(i),
+        });
+        let walls: Vec<u16> = self.planes.iter().map(|p| p.material).collect();
+        let classes = Classes::of(bodies, &walls);
+        let choice = |speed: f64| {
+            let conditions = Conditions {
+                speed,
+                overlap: FAILING_OVERLAP,
+                pressure: 0.0,
+            };
+            let limits = timestep::limits_of(&classes, &self.law, &conditions, &Shares::default());
+            timestep::choose(limits, 1.0)
+        };
+        let mut choice_now = choice(0.0);
+        if leap && self.timestep <= choice_now.seconds {
+            // Two grains may meet head on.
+            let speeds = self.grains.motion[..n].iter().map(|v| vector(v).norm());
+            choice_now = choice(2.0 * speeds.fold(0.0, f64::max));
+        }
+        Remedy {
+            seconds: choice_now.seconds,
+            limit: choice_now.binding,
+            exceeded: self.timestep > choice_now.seconds,
         }
     }
 

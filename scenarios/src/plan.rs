@@ -9,7 +9,7 @@ use crate::run::step::Step;
 use crate::scene::{BagnoldScene, ImpactScene, InclineScene, InclineStart, Scene, SceneBody};
 use colluvium_coupling::incline::{InclineRun, InclineSpec};
 use colluvium_dem::preparation::settle_incline_bed;
-use colluvium_dem::timestep;
+use colluvium_dem::timestep::{self, Limit};
 use colluvium_dem::{Normal, Threads};
 use std::fmt::Write;
 use std::ops::ControlFlow;
@@ -34,6 +34,25 @@ impl Lines {
     fn say(&mut self, topic: &str, text: &str) {
         // Writing to a string does not fail.
         let _ = writeln!(self.0, "{topic:<16} {text}");
+    }
+
+    /// A step, what binds it, and every other limit with the step that it would allow.
+    fn say_step(&mut self, step: f64, binding: &str, all: &[Limit]) {
+        self.say("time step", &format!("{step:.4e} s: {binding}"));
+        for limit in all.iter().skip(1) {
+            self.say("", &format!("{:.4e} s would be {limit}", limit.step()));
+        }
+        if let Some(hard) = timestep::hard(all) {
+            self.say(
+                "",
+                &format!(
+                    "{:.0} % of the stability limit of one contact, {:.4e} s ({})",
+                    100.0 * step / hard.seconds,
+                    hard.seconds,
+                    hard.name
+                ),
+            );
+        }
     }
 }
 
@@ -69,10 +88,10 @@ fn measured_rate(scene: &InclineScene) -> Option<f64> {
 
 fn incline(scene: &Scene, body: &InclineScene) -> Result<String, Failure> {
     let mut lines = Lines::default();
-    let law = run::incline::law(body);
     let Step {
         seconds: step,
         limit: step_limit,
+        all: all_limits,
     } = run::incline::step(body);
     let grains = body.free_grains();
     let [length, width] = body.floor_edges();
@@ -122,16 +141,7 @@ fn incline(scene: &Scene, body: &InclineScene) -> Result<String, Failure> {
             100.0 * struck / (0.5 * body.grains.diameter)
         ),
     );
-    let smallest = mass * (2.0 * body.smallest_radius() / body.grains.diameter).powi(3);
-    let limit = timestep::stability_limit(&law, smallest, body.smallest_radius(), 0.0);
-    lines.say(
-        "time step",
-        &format!(
-            "{step:.4e} s: {}; {:.0} % of the stability limit of the smallest grain on one spring, {limit:.3e} s",
-            step_limit,
-            100.0 * step / limit
-        ),
-    );
+    lines.say_step(step, &step_limit, &all_limits);
     let least = ((body.time.relax + body.time.average) / step).ceil();
     let most = (body.time.limit / step).ceil();
     lines.say(
@@ -282,7 +292,7 @@ fn impact(scene: &Scene, body: &ImpactScene) -> Result<String, Failure> {
         ),
     );
     let step = impact.step.seconds;
-    lines.say("time step", &format!("{step:.4e} s: {}", impact.step.limit));
+    lines.say_step(step, &impact.step.limit, &impact.step.all);
     lines.say(
         "steps",
         &format!("{:.0}, well under a second per million", impact.steps()),

@@ -1,5 +1,6 @@
 //! Fixtures shared by the tests across crates: materials, beds, other codes' figures.
 
+pub mod blow_up;
 pub mod fit;
 pub mod gas;
 pub mod impacts;

@@ -31,6 +31,11 @@ impl Epsd {
         2.25 * normal * (self.rolling_friction * reduced_radius).powi(2)
     }
 
+    /// C_r (N m s/rad) beside a spring k_r (N m/rad), at `1/(m_i R_i²) + 1/(m_j R_j²)` (kg⁻¹ m⁻²).
+    pub(super) fn coefficient(&self, stiffness: f64, inverse_inertia: f64) -> f64 {
+        2.0 * self.damping_ratio * (stiffness * ABOUT_THE_CONTACT / inverse_inertia).sqrt()
+    }
+
     pub(super) fn coefficients(&self) -> [f64; 2] {
         [self.rolling_friction, self.damping_ratio]
     }

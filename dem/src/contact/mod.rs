@@ -26,6 +26,7 @@ pub mod cohesion;
 pub mod composition;
 #[cfg(test)]
 mod cycles;
+pub mod dashpots;
 pub mod epsd;
 pub mod hertz;
 pub mod hooke;
@@ -42,6 +43,7 @@ pub mod viscoelastic;
 use crate::lanes::{Lane, Vec3};
 pub use cohesion::Cohesion;
 pub use composition::Composition;
+pub use dashpots::{Dashpots, Inertia};
 pub use epsd::Epsd;
 pub use hertz::{Elasticity, Hertz};
 pub use hooke::{Damping, Hooke};

@@ -12,6 +12,7 @@ use crate::table::Table;
 use colluvium_dem::{
     ContactLaw, Grain, Partner, Record, Setup, SetupError, Simulation, Snapshot, timestep,
 };
+use nalgebra::Vector3;
 use std::path::Path;
 
 /// Steps between two looks at the clock.
@@ -79,7 +80,7 @@ pub struct Ran {
 /// Time step and what stands against a longer one.
 #[derive(Clone, Copy, Debug)]
 pub struct Limit {
-    /// Stability limit of the fastest spring of the lightest free grain (s).
+    /// Stability limit of a contact of two of the lightest free grains, dashpots included (s).
     pub stability: f64,
     /// Half a period of the same grain's contact with an equal one (s).
     pub half_period: f64,
@@ -92,10 +93,13 @@ impl Bed {
     pub fn limit(&self) -> Limit {
         let free = self.setup.grains.iter().filter(|g| !g.fixed);
         let lightest = free.min_by(|a, b| a.mass().total_cmp(&b.mass()));
-        let (mass, radius) = lightest.map_or((1.0, 1.0), |g| (g.mass(), g.radius));
+        let lightest = lightest
+            .copied()
+            .unwrap_or_else(|| Grain::at_rest(Vector3::zeros(), 1.0, 1.0));
+        let (mass, radius) = (lightest.mass(), lightest.radius);
         let overlap = impact_scales::overlap(&self.law, 0.5 * mass, 0.5 * radius, self.speed);
         Limit {
-            stability: timestep::stability_limit(&self.law, mass, radius, overlap),
+            stability: timestep::contact_limit(&self.law, &lightest, Some(&lightest), overlap).0,
             half_period: impact_scales::half_period(&self.law, 0.5 * mass, 0.5 * radius, overlap),
             overlap: overlap / radius,
         }

@@ -9,6 +9,7 @@ use crate::progress::Bar;
 use crate::scene::{ImpactScene, RollingKeys, Scene, SceneError};
 use crate::summary::{Model, Quantity, Summary};
 use crate::table::Table;
+use colluvium_dem::timestep::Conditions;
 use colluvium_dem::{
     Cohesion, ContactLaw, Damping, Domain, Grain, GrainSample, Normal, Plane, Record, Setup,
     SetupError, ShapeParameter, Simulation, Snapshot, Threads,
@@ -162,13 +163,18 @@ pub fn prepare(scene: &ImpactScene, pair: bool) -> Result<Impact, SceneError> {
         approach + 2.0 * contact_time
     };
     let reach = 20.0 * radius + scene.gap;
+    let conditions = Conditions {
+        speed: scene.speed,
+        overlap: overlap.max(0.0) / radius,
+        ..Conditions::default()
+    };
     let step = choose(
         undamped,
         scene.steps_per_contact,
         &law,
-        mass,
-        radius,
-        overlap,
+        &grains,
+        !pair,
+        &conditions,
     );
     Ok(Impact {
         overlap,

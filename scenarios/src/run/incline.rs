@@ -15,7 +15,9 @@ use colluvium_coupling::incline::{
     InclineError, InclineResult, InclineRun, InclineSpec, Outcome, Purpose, SeriesPoint, Start,
 };
 use colluvium_dem::preparation::{Bed, InclineBed, RadiusLaw, settle_incline_bed};
-use colluvium_dem::{ContactLaw, Hooke, SetupError, Snapshot, TangentialSpring, Threads, timestep};
+use colluvium_dem::timestep::{self, Conditions};
+use colluvium_dem::{ContactLaw, Grain, Hooke, SetupError, Snapshot, TangentialSpring, Threads};
+use nalgebra::Vector3;
 use std::ops::ControlFlow;
 
 /// Steps between two looks at the clock.
@@ -55,17 +57,27 @@ pub fn law(scene: &InclineScene) -> ContactLaw {
     )
 }
 
-/// The time step of a scene: that of two mean grains (Eq. 2.7) unless the smallest needs a finer one.
+/// The time step of a scene: that of two mean grains (Eq. 2.7) unless another limit of the smallest
+/// needs a finer one.
 pub fn step(scene: &InclineScene) -> Step {
     let contact_time = timestep::step(scene.mean_mass(), scene.stiffness(), 1.0);
-    let smallest = 2.0 * scene.smallest_radius() / scene.grains.diameter;
+    let smallest = Grain::at_rest(
+        Vector3::zeros(),
+        scene.smallest_radius(),
+        scene.grains.density,
+    );
+    // Grains of dense flows meet at no more than the speed of a fall through one diameter.
+    let conditions = Conditions {
+        speed: (2.0 * scene.gravity * scene.grains.diameter).sqrt(),
+        ..Conditions::default()
+    };
     choose(
         contact_time,
         scene.timestep.steps_per_contact,
         &law(scene),
-        scene.mean_mass() * smallest.powi(3),
-        scene.smallest_radius(),
-        0.0,
+        &[smallest],
+        false,
+        &conditions,
     )
 }
 

@@ -1,44 +1,58 @@
 //! The time step of grains, and what limits it.
 
-use colluvium_dem::{ContactLaw, timestep};
-
-/// Share of the stability limit of one spring that a step may take: grains in a packing have
-/// several contacts at once, and the dashpots lower the limit further.
-const SHARE_OF_STABILITY: f64 = 0.3;
+use colluvium_dem::timestep::{Choice, Conditions, Limit, Shares, choose as choose_among, limits};
+use colluvium_dem::{ContactLaw, Grain, LawTable};
 
 /// A time step and its reason.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Step {
     /// The step (s).
     pub seconds: f64,
-    /// What limits it, `contact` or `stability`, in words.
+    /// What limits it, in words.
     pub limit: String,
+    /// All limits, the binding one first.
+    pub all: Vec<Limit>,
 }
 
-/// The smaller of contact time over steps per contact, and a share of the stability limit of the
-/// smallest grain at an overlap (m; a linear spring does not care): a large β makes rolling springs faster than the contact.
+impl From<Choice> for Step {
+    fn from(choice: Choice) -> Step {
+        Step {
+            seconds: choice.seconds,
+            limit: choice
+                .limit()
+                .map_or_else(|| "nothing".into(), ToString::to_string),
+            all: choice.all,
+        }
+    }
+}
+
+/// The step of grains of one law: its own contact time over the steps per contact, unless another
+/// limit of these grains (and of walls of the same material) is shorter.
 pub fn choose(
     contact_time: f64,
     steps_per_contact: f64,
     law: &ContactLaw,
-    smallest_mass: f64,
-    smallest_radius: f64,
-    overlap: f64,
+    grains: &[Grain],
+    walled: bool,
+    conditions: &Conditions,
 ) -> Step {
-    let contact = contact_time / steps_per_contact;
-    let stability = SHARE_OF_STABILITY
-        * timestep::stability_limit(law, smallest_mass, smallest_radius, overlap);
-    if contact <= stability {
-        Step {
-            seconds: contact,
-            limit: format!("contact: undamped contact time over {steps_per_contact}"),
-        }
-    } else {
-        Step {
-            seconds: stability,
-            limit: format!(
-                "stability: {SHARE_OF_STABILITY} of the stability limit of the smallest grain's fastest spring; the contact time over {steps_per_contact} would be {contact:.3e} s"
-            ),
-        }
-    }
+    let shares = Shares {
+        steps_per_contact,
+        contact_time: Some(contact_time),
+        ..Shares::default()
+    };
+    // A law that does not stand is refused where the simulation is made, with its key.
+    let Ok(laws) = LawTable::new(&(*law).into()) else {
+        return Step {
+            seconds: contact_time / steps_per_contact,
+            limit: "contact time".into(),
+            all: Vec::new(),
+        };
+    };
+    let walls: &[u16] = if walled { &[0] } else { &[] };
+    choose_among(
+        limits(grains, walls, &laws, conditions, &shares),
+        shares.safety,
+    )
+    .into()
 }
