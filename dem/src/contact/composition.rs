@@ -14,7 +14,7 @@
 //! | viscoelastic | none, linear with κ in N/m, Mindlin | none, EPSD | any |
 //! | JKR | none, its own | none, its own | none: its own |
 //!
-//! [`ContactLaw::composition`] refuses everything else with the reason.
+//! [`Composition::of`] refuses everything else with the reason.
 
 use super::table::Table;
 use super::{

@@ -35,7 +35,7 @@ const COLUMNS: [(&str, &str); 13] = [
     ("contacts", "1"),
 ];
 
-/// Numbers of a row, in the order of [`COLUMNS`].
+/// Numbers of a row, in the order of `COLUMNS`.
 pub type Row = [f64; COLUMNS.len()];
 
 /// Column of the step, the kinetic energies and the centre of mass.
