@@ -21,16 +21,19 @@
 //! dense packings of 216 grains blow up at 0.52 to 1.2 of what their stiffest contact allows, under all
 //! laws with and without dashpots (`step-limits` in the benchmarks).
 
+mod bodies;
+mod expected;
+mod limit;
 mod stability;
 
-use crate::contact::{
-    ContactLaw, Elasticity, Hertz, Inertia, LawTable, Mindlin, Normal, Tangential,
-};
+use crate::contact::{ContactLaw, Elasticity, Hertz, LawTable, Mindlin, Normal, Tangential};
 use crate::grains::Grain;
-use nalgebra::Vector3;
-use stability::{Surfaces, oscillations};
+use bodies::surfaces;
+pub(crate) use bodies::{Body, Classes};
+pub use expected::{Conditions, Shares};
+pub use limit::{Choice, Guards, Limit, Pair, Remedy, hard};
+use stability::oscillations;
 use std::f64::consts::PI;
-use std::fmt;
 
 /// k_n (N/m) that keeps the overlap below `largest_overlap` (m) at `speed` (m/s) for mass (kg).
 pub fn stiffness(mass: f64, speed: f64, largest_overlap: f64) -> f64 {
@@ -40,277 +43,6 @@ pub fn stiffness(mass: f64, speed: f64, largest_overlap: f64) -> f64 {
 /// Step (s) that resolves a contact of two grains of `mass` (kg) by `steps_per_contact` steps.
 pub fn step(mass: f64, stiffness: f64, steps_per_contact: f64) -> f64 {
     PI * (mass / (2.0 * stiffness)).sqrt() / steps_per_contact
-}
-
-/// What grains will meet.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Conditions {
-    /// Largest speed of two surfaces against each other (m/s).
-    pub speed: f64,
-    /// Largest overlap of any contact over the harmonic mean of its radii (–), as
-    /// [`crate::Simulation::largest_overlap`] reports it.
-    pub overlap: f64,
-    /// Largest pressure (Pa): a contact carries it on the product of its diameters.
-    pub pressure: f64,
-}
-
-impl Default for Conditions {
-    /// At rest, with an overlap of 1 %.
-    fn default() -> Self {
-        Conditions {
-            speed: 0.0,
-            overlap: 0.01,
-            pressure: 0.0,
-        }
-    }
-}
-
-impl Conditions {
-    /// Speeds of the start and of a fall through the whole heap, and its weight.
-    pub fn of(grains: &[Grain], gravity: &Vector3<f64>) -> Conditions {
-        let fastest = grains.iter().map(|g| g.velocity.norm()).fold(0.0, f64::max);
-        let g = gravity.norm();
-        let height = |grain: &Grain| grain.position.dot(gravity) / g.max(f64::MIN_POSITIVE);
-        let low = grains.iter().map(height).fold(f64::INFINITY, f64::min);
-        let high = grains.iter().map(height).fold(f64::NEG_INFINITY, f64::max);
-        let depth = if g > 0.0 && high > low {
-            high - low
-        } else {
-            0.0
-        };
-        let heaviest = grains.iter().map(|g| g.density).fold(0.0, f64::max);
-        Conditions {
-            // Two grains may meet head on.
-            speed: 2.0 * fastest + (2.0 * g * depth).sqrt(),
-            pressure: DENSE * heaviest * g * depth,
-            ..Conditions::default()
-        }
-    }
-}
-
-/// Solid fraction of a dense packing.
-const DENSE: f64 = 0.6;
-
-/// Which share of each time a step may take.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Shares {
-    /// Steps of a contact (N); elastic laws count only a `contact_time` that is given.
-    pub steps_per_contact: f64,
-    /// Contact time (s) that those steps divide instead of the shortest one of all pairs: a scene may
-    /// count them for its mean grain, as the thesis does.
-    pub contact_time: Option<f64>,
-    /// Of the Hertz time.
-    pub hertz: f64,
-    /// Of the Rayleigh time.
-    pub rayleigh: f64,
-    /// Of the JKR time.
-    pub jkr: f64,
-    /// Of the stability limit of one contact.
-    pub stability: f64,
-    /// Of the smallest radius over the speed.
-    pub travel: f64,
-    /// Of what remains: a scene's own safety factor.
-    pub safety: f64,
-}
-
-impl Default for Shares {
-    fn default() -> Self {
-        Shares {
-            steps_per_contact: 30.0,
-            contact_time: None,
-            hertz: 0.1,
-            rayleigh: 0.1,
-            jkr: 0.1,
-            stability: 0.3,
-            travel: 0.1,
-            safety: 1.0,
-        }
-    }
-}
-
-/// Two surfaces that a limit is for; a wall's radius is infinite.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Pair {
-    /// Numbers of the materials.
-    pub materials: [u16; 2],
-    /// Radii (m).
-    pub radii: [f64; 2],
-}
-
-impl fmt::Display for Pair {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let [a, b] = self.materials;
-        if a != b {
-            write!(f, "materials {a} and {b}, ")?;
-        }
-        match self.radii {
-            [r, wall] | [wall, r] if wall.is_infinite() => write!(f, "radius {r:.4e} m on a wall"),
-            [r, s] if r == s => write!(f, "radii {r:.4e} m"),
-            [r, s] => write!(f, "radii {r:.4e} m and {s:.4e} m"),
-        }
-    }
-}
-
-/// What a limit guards.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Guards {
-    /// Accuracy: the step must resolve this time.
-    Accuracy,
-    /// Stability: beyond this time itself the energy of one contact grows without end.
-    Stability,
-}
-
-/// A time that the step must stay below.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Limit {
-    /// In a word or two.
-    pub name: &'static str,
-    /// The time itself (s).
-    pub seconds: f64,
-    /// Share of it that a step may take.
-    pub share: f64,
-    /// What it guards.
-    pub guards: Guards,
-    /// What it is.
-    pub why: &'static str,
-    /// For whom it is shortest.
-    pub pair: Pair,
-}
-
-impl Limit {
-    /// The step it allows (s).
-    pub fn step(&self) -> f64 {
-        self.share * self.seconds
-    }
-}
-
-impl fmt::Display for Limit {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Limit {
-            name, seconds, why, ..
-        } = self;
-        write!(f, "{name}: ")?;
-        if self.share < 1.0 && (1.0 / self.share).fract() == 0.0 && self.share < 0.1 {
-            write!(f, "1/{:.0}", 1.0 / self.share)?;
-        } else {
-            write!(f, "{:.3}", self.share)?;
-        }
-        write!(f, " of {seconds:.4e} s, {why} ({})", self.pair)
-    }
-}
-
-/// A step and its reason.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Choice {
-    /// The step (s); infinite if nothing limits it.
-    pub seconds: f64,
-    /// Name of the limit that binds.
-    pub binding: &'static str,
-    /// All limits, the binding one first.
-    pub all: Vec<Limit>,
-}
-
-impl Choice {
-    /// The limit that binds.
-    pub fn limit(&self) -> Option<&Limit> {
-        self.all.first()
-    }
-
-    /// The shortest time at which a contact blows up, and its name.
-    pub fn hard(&self) -> Option<&Limit> {
-        hard(&self.all)
-    }
-}
-
-/// The shortest of the limits that guard stability.
-pub fn hard(limits: &[Limit]) -> Option<&Limit> {
-    limits
-        .iter()
-        .filter(|l| l.guards == Guards::Stability)
-        .min_by(|a, b| a.seconds.total_cmp(&b.seconds))
-}
-
-/// A grain or a wall, by what limits need of it; fixed ones have infinite mass.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(crate) struct Body {
-    pub material: u16,
-    pub radius: f64,
-    pub mass: f64,
-    pub fixed: bool,
-}
-
-impl Body {
-    fn wall(material: u16) -> Body {
-        Body {
-            material,
-            radius: f64::INFINITY,
-            mass: f64::INFINITY,
-            fixed: true,
-        }
-    }
-
-    fn density(&self) -> f64 {
-        self.mass / (4.0 / 3.0 * PI * self.radius.powi(3))
-    }
-}
-
-impl From<&Grain> for Body {
-    fn from(g: &Grain) -> Body {
-        Body {
-            material: g.material,
-            radius: g.radius,
-            mass: g.mass(),
-            fixed: g.fixed,
-        }
-    }
-}
-
-/// The few bodies of each material that a shortest limit can belong to.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Classes {
-    bodies: Vec<Body>,
-}
-
-impl Classes {
-    /// Of grains and of walls by their materials.
-    pub fn of(grains: impl Iterator<Item = Body>, walls: &[u16]) -> Classes {
-        // Smallest, largest and lightest of each material, free and fixed.
-        let mut found: Vec<[Body; 3]> = Vec::new();
-        for body in grains {
-            let alike = |[first, ..]: &&mut [Body; 3]| {
-                (first.material, first.fixed) == (body.material, body.fixed)
-            };
-            let Some([small, large, light]) = found.iter_mut().find(alike) else {
-                found.push([body; 3]);
-                continue;
-            };
-            if body.radius < small.radius {
-                *small = body;
-            }
-            if body.radius > large.radius {
-                *large = body;
-            }
-            if body.mass < light.mass {
-                *light = body;
-            }
-        }
-        let mut bodies: Vec<Body> = Vec::new();
-        let walls = walls.iter().map(|&material| Body::wall(material));
-        for body in found.into_iter().flatten().chain(walls) {
-            if !bodies.contains(&body) {
-                bodies.push(body);
-            }
-        }
-        Classes { bodies }
-    }
-
-    fn pairs(&self) -> impl Iterator<Item = (&Body, &Body)> {
-        let pairs = self.bodies.iter().enumerate();
-        pairs.flat_map(|(k, a)| {
-            let partners = self.bodies[k..].iter().map(move |b| (a, b));
-            partners.filter(|(a, b)| !(a.fixed && b.fixed))
-        })
-    }
 }
 
 /// Shortest times of each kind so far.
@@ -327,6 +59,91 @@ impl Shortest {
             Some(known) => *known = limit,
             None => self.0.push(limit),
         }
+    }
+
+    /// What two bodies in contact allow.
+    fn take_pair(
+        &mut self,
+        law: &ContactLaw,
+        [a, b]: [&Body; 2],
+        conditions: &Conditions,
+        shares: &Shares,
+    ) {
+        let pair = Pair {
+            materials: [a.material, b.material],
+            radii: [a.radius, b.radius],
+        };
+        let surfaces = surfaces(a, b);
+        let overlap = expected::overlap(law, a, b, &surfaces.inertia, conditions);
+        for oscillation in oscillations(law, &surfaces, overlap) {
+            self.take(Limit {
+                name: oscillation.name,
+                seconds: oscillation.seconds,
+                share: shares.stability,
+                guards: Guards::Stability,
+                why: "at which one contact's energy grows without end",
+                pair,
+            });
+        }
+        let mut resolve = |name, seconds, share, why| {
+            self.take(Limit::accuracy(pair, name, seconds, share, why));
+        };
+        let mass = surfaces.inertia.reduced_mass;
+        let counted = match &law.normal {
+            Normal::Hooke(hooke) => Some(PI * (mass / hooke.stiffness).sqrt()),
+            _ => None,
+        };
+        if let Some(time) = shares.contact_time.or(counted) {
+            resolve(
+                "contact time",
+                time,
+                1.0 / shares.steps_per_contact,
+                "undamped contact time (Thuillet 2019, Eq. 2.7)",
+            );
+        }
+        resolve(
+            "Hertz time",
+            hertz_time(law, mass, surfaces.inertia.reduced_radius, conditions.speed),
+            shares.hertz,
+            "duration of an elastic impact at the largest speed",
+        );
+    }
+
+    /// What one grain allows among its like.
+    fn take_grain(
+        &mut self,
+        law: &ContactLaw,
+        grain: &Body,
+        conditions: &Conditions,
+        shares: &Shares,
+    ) {
+        let alike = Pair {
+            materials: [grain.material; 2],
+            radii: [grain.radius; 2],
+        };
+        let mut resolve = |name, seconds, share, why| {
+            self.take(Limit::accuracy(alike, name, seconds, share, why));
+        };
+        resolve(
+            "Rayleigh time",
+            rayleigh_time(law, grain.radius, grain.density()),
+            shares.rayleigh,
+            "in which a surface wave crosses the grain",
+        );
+        if let Normal::Jkr(jkr) = &law.normal {
+            resolve(
+                "JKR time",
+                jkr.characteristic_time(grain.radius, grain.density()),
+                shares.jkr,
+                "in which an adhesive contact oscillates (Tatsuuma et al. 2019)",
+            );
+        }
+        resolve(
+            "travel",
+            grain.radius / conditions.speed,
+            shares.travel,
+            "in which the largest speed crosses the radius",
+        );
     }
 }
 
@@ -352,89 +169,11 @@ pub(crate) fn limits_of(
     let mut shortest = Shortest(Vec::new());
     for (a, b) in classes.pairs() {
         let law = laws.between(usize::from(a.material), usize::from(b.material));
-        let pair = Pair {
-            materials: [a.material, b.material],
-            radii: [a.radius, b.radius],
-        };
-        let surfaces = surfaces(a, b);
-        let overlap = overlap(law, a, b, &surfaces.inertia, conditions);
-        for oscillation in oscillations(law, &surfaces, overlap) {
-            shortest.take(Limit {
-                name: oscillation.name,
-                seconds: oscillation.seconds,
-                share: shares.stability,
-                guards: Guards::Stability,
-                why: "at which one contact's energy grows without end",
-                pair,
-            });
-        }
-        let accuracy = |name, seconds, share, why| Limit {
-            name,
-            seconds,
-            share,
-            guards: Guards::Accuracy,
-            why,
-            pair,
-        };
-        let (mass, radius) = (
-            surfaces.inertia.reduced_mass,
-            surfaces.inertia.reduced_radius,
-        );
-        let counted = match &law.normal {
-            Normal::Hooke(hooke) => Some(PI * (mass / hooke.stiffness).sqrt()),
-            _ => None,
-        };
-        if let Some(time) = shares.contact_time.or(counted) {
-            shortest.take(accuracy(
-                "contact time",
-                time,
-                1.0 / shares.steps_per_contact,
-                "undamped contact time (Thuillet 2019, Eq. 2.7)",
-            ));
-        }
-        shortest.take(accuracy(
-            "Hertz time",
-            hertz_time(law, mass, radius, conditions.speed),
-            shares.hertz,
-            "duration of an elastic impact at the largest speed",
-        ));
+        shortest.take_pair(law, [a, b], conditions, shares);
     }
     for body in classes.bodies.iter().filter(|b| !b.fixed) {
         let own = usize::from(body.material);
-        let law = laws.between(own, own);
-        let mut take = |name, seconds, share, why| {
-            shortest.take(Limit {
-                name,
-                seconds,
-                share,
-                guards: Guards::Accuracy,
-                why,
-                pair: Pair {
-                    materials: [body.material; 2],
-                    radii: [body.radius; 2],
-                },
-            });
-        };
-        take(
-            "Rayleigh time",
-            rayleigh_time(law, body.radius, body.density()),
-            shares.rayleigh,
-            "in which a surface wave crosses the grain",
-        );
-        if let Normal::Jkr(jkr) = &law.normal {
-            take(
-                "JKR time",
-                jkr.characteristic_time(body.radius, body.density()),
-                shares.jkr,
-                "in which an adhesive contact oscillates (Tatsuuma et al. 2019)",
-            );
-        }
-        take(
-            "travel",
-            body.radius / conditions.speed,
-            shares.travel,
-            "in which the largest speed crosses the radius",
-        );
+        shortest.take_grain(laws.between(own, own), body, conditions, shares);
     }
     shortest.0
 }
@@ -467,57 +206,6 @@ pub fn choose(mut limits: Vec<Limit>, safety: f64) -> Choice {
         binding,
         all: limits,
     }
-}
-
-fn surfaces(a: &Body, b: &Body) -> Surfaces {
-    let inverse = |body: &Body| if body.fixed { 0.0 } else { 1.0 / body.mass };
-    let (m, n) = (inverse(a), inverse(b));
-    let about = |inverse: f64, body: &Body, power: i32| {
-        if body.fixed {
-            0.0
-        } else {
-            inverse / body.radius.powi(power)
-        }
-    };
-    Surfaces {
-        inertia: Inertia {
-            reduced_mass: 1.0 / (m + n),
-            reduced_radius: 1.0 / (1.0 / a.radius + 1.0 / b.radius),
-            inverse_inertia: about(m, a, 2) + about(n, b, 2),
-        },
-        skew: about(m, a, 1) - about(n, b, 1),
-    }
-}
-
-/// Largest overlap that a pair will meet (m).
-fn overlap(law: &ContactLaw, a: &Body, b: &Body, inertia: &Inertia, expected: &Conditions) -> f64 {
-    let Inertia {
-        reduced_mass: mass,
-        reduced_radius: radius,
-        ..
-    } = *inertia;
-    let walled = a.radius.is_infinite() || b.radius.is_infinite();
-    let (mean, breadth) = if walled {
-        (radius, 4.0 * radius * radius)
-    } else {
-        (2.0 * radius, 4.0 * a.radius * b.radius)
-    };
-    let load = expected.pressure * breadth + law.cohesion.force(radius);
-    let speed = expected.speed;
-    let elastic = |modulus: f64| {
-        let struck = (15.0 * mass * speed * speed / (16.0 * modulus * radius.sqrt())).powf(0.4);
-        let pressed = (0.75 * load / (modulus * radius.sqrt())).powf(2.0 / 3.0);
-        struck.max(pressed)
-    };
-    let met = match &law.normal {
-        Normal::Hooke(hooke) => {
-            (load / hooke.stiffness).max(speed * (mass / hooke.stiffness).sqrt())
-        }
-        Normal::Hertz(hertz) => elastic(hertz.effective_modulus),
-        Normal::Viscoelastic(v) => elastic(v.effective_modulus),
-        Normal::Jkr(jkr) => elastic(jkr.effective_modulus()).max(jkr.equilibrium_overlap(radius)),
-    };
-    met.max(expected.overlap * mean)
 }
 
 /// `2.87 (m²/(R E*² v))^{1/5}`, infinite at rest.
@@ -569,38 +257,11 @@ fn rayleigh(material: &Elasticity, radius: f64, density: f64) -> f64 {
         / (0.1631 * material.poissons_ratio + 0.8766)
 }
 
-/// A step that would do where one has failed.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct Remedy {
-    /// The step (s).
-    pub seconds: f64,
-    /// The limit that it comes from.
-    pub limit: &'static str,
-    /// Whether the failing step was longer.
-    pub exceeded: bool,
-}
-
-impl fmt::Display for Remedy {
-    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
-        let Remedy { seconds, limit, .. } = self;
-        if !seconds.is_finite() {
-            write!(f, "nothing in the contact laws limits it")
-        } else if self.exceeded {
-            write!(f, "{seconds:.3e} s would do (limit: {limit})")
-        } else {
-            write!(
-                f,
-                "though it is within its limits (the nearest is {limit}, {seconds:.3e} s): the grains \
-                 are too soft for their speeds, or started inside each other"
-            )
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
     use crate::contact::{Damping, Hooke, TangentialSpring};
+    use nalgebra::Vector3;
 
     #[test]
     fn a_head_on_impact_reaches_the_overlap_asked_for() {
@@ -703,15 +364,5 @@ mod tests {
         let hard = hard(&all).unwrap();
         assert_eq!(hard.name, "normal dashpot");
         assert!((hard.seconds * rate / 2.0 - 1.0).abs() < 1e-6);
-    }
-
-    #[test]
-    fn pairs_and_walls_are_named() {
-        let pair = |materials, radii| Pair { materials, radii }.to_string();
-        assert_eq!(pair([0, 0], [1e-3, 1e-3]), "radii 1.0000e-3 m");
-        assert_eq!(
-            pair([0, 1], [1e-3, f64::INFINITY]),
-            "materials 0 and 1, radius 1.0000e-3 m on a wall"
-        );
     }
 }
