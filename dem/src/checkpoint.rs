@@ -100,6 +100,7 @@ impl Simulation {
                 u64::from(self.springs_current),
             ],
         );
+        self.loads.record(&mut record);
         record
     }
 
@@ -239,6 +240,7 @@ impl Simulation {
         self.list.first = first;
         self.list.partner = partner;
         self.list.restore(levels);
+        self.loads.read(record, &grains)?;
         self.grains = grains;
         self.weigh();
 

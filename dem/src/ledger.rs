@@ -5,7 +5,7 @@
 //! moved grains adds up to the kinetic energy *to round-off*, at any time step:
 //!
 //! ```text
-//! K(now) = K(start) + Σ W_channel + W_gravity + W_drive
+//! K(now) = K(start) + Σ W_channel + W_gravity + W_drive + W_loads
 //! dissipated by a channel = -W_channel - (E_channel(now) - E_channel(start))
 //! ```
 //! E_channel is the energy that the law says its springs hold, so a channel that dissipates less than
@@ -14,7 +14,6 @@
 
 use crate::contact::Stored;
 use crate::grains::{SPHERE_INERTIA, vector};
-use crate::motion;
 use crate::planes::Plane;
 use crate::simulation::Simulation;
 use nalgebra::Vector3;
@@ -62,6 +61,9 @@ pub struct EnergyLedger {
     pub gravity: f64,
     /// Work put in by grains that move as they are told.
     pub drive: f64,
+    /// Work of steady loads.
+    #[serde(default)]
+    pub loads: f64,
     /// Energy in contacts when it was opened.
     pub stored_before: Channels,
     /// Energy in contacts now.
@@ -83,7 +85,7 @@ impl EnergyLedger {
 
     /// What is not accounted for, relative to the largest entry: round-off.
     pub fn error(&self) -> f64 {
-        let put_in = self.work.sum() + self.gravity + self.drive;
+        let put_in = self.work.sum() + self.gravity + self.drive + self.loads;
         let entries = [
             self.kinetic_before,
             self.kinetic,
@@ -92,6 +94,7 @@ impl EnergyLedger {
             self.work.tangential,
             self.gravity,
             self.drive,
+            self.loads,
         ];
         let scale = entries.iter().fold(0.0_f64, |a, e| a.max(e.abs()));
         if scale > 0.0 {
@@ -106,9 +109,9 @@ impl EnergyLedger {
     /// All entries, for a checkpoint.
     pub(crate) fn numbers(&self) -> Vec<f64> {
         let channels = |c: &Channels| [c.normal, c.tangential, c.rolling, c.twisting];
-        let single = [self.kinetic_before, self.kinetic, self.gravity, self.drive];
         [
-            single,
+            [self.kinetic_before, self.kinetic, self.gravity, self.drive],
+            [self.loads, 0.0, 0.0, 0.0],
             channels(&self.work),
             channels(&self.stored_before),
             channels(&self.stored),
@@ -118,14 +121,25 @@ impl EnergyLedger {
 
     /// The ledger of a checkpoint; none where it was not open.
     pub(crate) fn from_numbers(numbers: &[f64]) -> Result<Option<EnergyLedger>, String> {
-        let &[kinetic_before, kinetic, gravity, drive, ref rest @ ..] = numbers else {
+        let &[
+            kinetic_before,
+            kinetic,
+            gravity,
+            drive,
+            loads,
+            _,
+            _,
+            _,
+            ref rest @ ..,
+        ] = numbers
+        else {
             return match numbers {
                 [] => Ok(None),
                 _ => Err("array `energy_ledger` is too short".into()),
             };
         };
         let [work, stored_before, stored] = rest.as_chunks::<4>().0 else {
-            return Err("array `energy_ledger` must have 16 numbers".into());
+            return Err("array `energy_ledger` must have 20 numbers".into());
         };
         let channels = |&[normal, tangential, rolling, twisting]: &[f64; 4]| Channels {
             normal,
@@ -139,6 +153,7 @@ impl EnergyLedger {
             work: channels(work),
             gravity,
             drive,
+            loads,
             stored_before: channels(stored_before),
             stored: channels(stored),
         }))
@@ -207,8 +222,7 @@ impl Simulation {
         let mut turn = vector(s);
         let fixed = self.grains.is_fixed(i);
         if !fixed {
-            let [force, torque, moment] =
-                motion::gather(&self.reach, &self.plane_contacts, self.slot_rows(), i);
+            let [force, torque, moment] = self.gather(i);
             velocity += 0.5 * kick * (vector(&force) * v[3] + self.gravity);
             turn += 0.5 * kick / SPHERE_INERTIA * v[3] * (vector(&torque) + vector(&moment) * s[3]);
         }
@@ -260,6 +274,13 @@ impl Simulation {
                             .map_or(0.0, |m| sign * vector(m).dot(&side.spin));
                     ledger.drive -= kick * power;
                 }
+            }
+        }
+        for (at, load) in self.loads.given() {
+            let grain = &moving[at];
+            if !grain.fixed {
+                let power = load.force.dot(&grain.velocity) + load.moment.dot(&grain.spin);
+                ledger.loads += kick * power;
             }
         }
         for contact in &self.plane_contacts.contacts {

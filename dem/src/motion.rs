@@ -8,10 +8,11 @@
 //! radius, which cancels: `d(Rω)/dt = 5/(2m) (T + M/R)`.
 //!
 //! Order of a grain's sum: its pairs as `i` in list order, then its pairs as `j` from the last to the
-//! first, then planes. Pairs of earlier chunks thus come last among pairs, whatever the cuts.
+//! first, then planes, then loads. Pairs of earlier chunks thus come last among pairs, whatever the cuts.
 
 use crate::grains::SPHERE_INERTIA;
 use crate::lanes::{Lanes4, Portable};
+use crate::loads::Loads;
 use crate::planes::PlaneContacts;
 use crate::reach::{Chunk, Reach, SHARES, Shared};
 
@@ -104,6 +105,15 @@ impl<L: Lanes4> Sum<L> {
         }
     }
 
+    /// Adds the loads.
+    #[inline(always)]
+    pub fn bear(&mut self, loads: &Loads, grain: usize) {
+        if let Some([force, moment]) = loads.of(grain) {
+            self.0[0] = self.0[0] + L::load(force);
+            self.0[2] = self.0[2] + L::load(moment);
+        }
+    }
+
     #[inline(always)]
     fn add(&mut self, slot: &[[f64; 4]]) {
         self.0[0] = self.0[0] + L::load(&slot[0]);
@@ -171,6 +181,7 @@ impl<L: Lanes4> Body<L> {
 pub(crate) fn gather(
     reach: &Reach,
     planes: &PlaneContacts,
+    loads: &Loads,
     rows: usize,
     g: usize,
 ) -> [[f64; 4]; 3] {
@@ -191,6 +202,7 @@ pub(crate) fn gather(
         sum.import(&reach.chunks, chunk, s, rows);
     }
     sum.lean(planes, g);
+    sum.bear(loads, g);
     let mut out = [[0.0; 4]; 3];
     for (out, sum) in out.iter_mut().zip(sum.0) {
         sum.store(out);

@@ -28,6 +28,12 @@ impl Visitor for Store<'_> {
 }
 
 impl Simulation {
+    /// Force and both moments on a grain at this instant.
+    pub(crate) fn gather(&self, i: usize) -> [[f64; 4]; 3] {
+        let (reach, planes) = (&self.reach, &self.plane_contacts);
+        motion::gather(reach, planes, &self.loads, self.slot_rows(), i)
+    }
+
     /// Velocity and angular velocity of a grain at the time of its position.
     pub(crate) fn synchronised(&self, i: usize) -> (Vector3<f64>, Vector3<f64>) {
         let (v, s) = (&self.grains.motion[i], &self.grains.turn[i]);
@@ -35,8 +41,7 @@ impl Simulation {
         let mut velocity = vector(v);
         let mut turn = vector(s);
         if self.steps_since_start > 0 && inverse_mass > 0.0 {
-            let [force, torque, moment] =
-                motion::gather(&self.reach, &self.plane_contacts, self.slot_rows(), i);
+            let [force, torque, moment] = self.gather(i);
             let half = 0.5 * self.timestep;
             velocity += half * (vector(&force) * inverse_mass + self.gravity);
             turn += half / SPHERE_INERTIA

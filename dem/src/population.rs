@@ -5,7 +5,6 @@
 //! ledger that is open is opened anew.
 
 use crate::grains::{Grain, SPHERE_INERTIA, vector};
-use crate::motion;
 use crate::setup::{SetupError, check_grains};
 use crate::simulation::Simulation;
 use crate::snapshot::GrainSample;
@@ -101,9 +100,7 @@ impl Simulation {
             if inverse_mass == 0.0 {
                 continue;
             }
-            let rows = self.layout.slot_rows;
-            let sums = motion::gather(&self.reach, &self.plane_contacts, rows, i);
-            let [force, torque, moment] = sums.map(|sum| vector(&sum));
+            let [force, torque, moment] = self.gather(i).map(|sum| vector(&sum));
             let inverse_radius = self.grains.turn[i][3];
             let back = half * (force * inverse_mass + self.gravity);
             let turn = half / SPHERE_INERTIA * inverse_mass * (torque + moment * inverse_radius);

@@ -7,8 +7,10 @@ use crate::domain::{Domain, Images};
 use crate::forces::{self, Field};
 use crate::grains::{Grains, vector};
 use crate::ledger::EnergyLedger;
+use crate::loads::Loads;
 use crate::motion::Motion;
 use crate::neighbours::Neighbours;
+use crate::places::Places;
 use crate::planes::{Plane, PlaneContacts};
 use crate::population::GONE;
 use crate::reach::{Making, Reach};
@@ -146,6 +148,9 @@ pub struct Simulation {
     pub(crate) list: Neighbours,
     pub(crate) reach: Reach,
     pub(crate) plane_contacts: PlaneContacts,
+    pub(crate) loads: Loads,
+    /// Rows by grain number, as of the last build of lists with loads.
+    pub(crate) places: Places,
     /// Histories on their way to new lists.
     touching: Touching,
     /// For each row, the square of the largest speed against its drift (m²/s²).
@@ -217,6 +222,8 @@ impl Simulation {
             list: Neighbours::default(),
             reach: Reach::new(skin / SKIN),
             plane_contacts: PlaneContacts::default(),
+            loads: Loads::default(),
+            places: Places::default(),
             touching: Touching::default(),
             fastest: Vec::new(),
             fixed: Vec::new(),
@@ -335,6 +342,9 @@ impl Simulation {
             self.plane_contacts
                 .evaluate(law, planes, &self.grains, lever, step)
         };
+        if pass != Pass::Motion {
+            self.loads.fill(&self.grains);
+        }
         let (g, n) = (self.gravity, self.grains.len());
         let grains = &mut self.grains;
         let sweep = Sweep {
@@ -351,6 +361,7 @@ impl Simulation {
                 step,
             },
             planes: &self.plane_contacts,
+            loads: &self.loads,
             rows: &self.list.rows,
             motion: Motion {
                 gravity: [g.x, g.y, g.z, 0.0],
@@ -381,7 +392,7 @@ impl Simulation {
                 self.impulse[k] -= kick * contact.slot[0][k];
             }
         }
-        self.account += self.weighed * kick * self.gravity;
+        self.account += kick * (self.weighed * self.gravity + self.loads.external);
         self.list.age += self.timestep;
         self.reach.age += self.timestep;
         self.reach.steps += 1;
@@ -517,6 +528,10 @@ impl Simulation {
             .collect(&mut self.reach, &mut self.grains, self.layout, &place);
         self.plane_contacts
             .build(&self.planes, &self.grains, &list.rows, listed, place);
+        if self.loads.looks_up() {
+            self.places.lay(&self.grains);
+            self.loads.settle(&self.places);
+        }
         self.renew_rows();
         self.make_reach(true);
         self.rebuilds += 1;

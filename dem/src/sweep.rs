@@ -13,6 +13,7 @@
 use crate::contact::Interaction;
 use crate::forces::{Field, batch, like_coefficients, slot_rows};
 use crate::lanes::{Lanes4, Portable, has_avx2};
+use crate::loads::Loads;
 use crate::motion::{Body, Motion, Ring, Sum, sums};
 use crate::neighbours::Row;
 use crate::planes::PlaneContacts;
@@ -37,6 +38,7 @@ pub(crate) struct Sweep<'a> {
     pub parallel: bool,
     pub field: Field<'a>,
     pub planes: &'a PlaneContacts,
+    pub loads: &'a Loads,
     pub rows: &'a [Row],
     pub motion: Motion,
     /// Fixed grains, in order.
@@ -276,6 +278,7 @@ fn chunk_in<L: Lanes4, I: Interaction, const ROWS: usize>(
                 }
                 let mut sum = Sum::<L>::load(sum);
                 sum.lean(sweep.planes, g);
+                sum.bear(sweep.loads, g);
                 move_grain(sweep, g, &sum, &mut moved, &mut cursor);
             }
         }
@@ -299,6 +302,7 @@ fn shared_in<L: Lanes4, I: Interaction>(
         let mut sum = Sum::<L>::load(&chunk.partial[s][..slot_rows::<I>()]);
         sum.import(all, chunk, s, slot_rows::<I>());
         sum.lean(sweep.planes, g);
+        sum.bear(sweep.loads, g);
         move_grain(sweep, g, &sum, &mut moved, &mut cursor);
     }
 }

@@ -1,0 +1,165 @@
+//! Forces and moments on grains besides those of contacts.
+//!
+//! One pair of rows a grain, filled at the start of a step from the present positions and added to
+//! the grain's sum after its pairs and planes:
+//!
+//! ```text
+//! d(m v)/dt = Σ F_contact + m g + F_load        d(I ω)/dt = Σ M_contact + M_load
+//! ```
+//! Rows exist only where a scene has loads, so that others pay one comparison a grain.
+
+use crate::grains::Grains;
+use crate::places::Places;
+use crate::population::GONE;
+use crate::record::Record;
+use crate::setup::{SetupError, check};
+use crate::simulation::Simulation;
+use nalgebra::Vector3;
+
+/// A steady force and moment on one grain, from outside.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Load {
+    /// Number of the grain (see [`crate::GrainSample::id`]).
+    pub grain: u32,
+    /// Force at the centre (N).
+    pub force: Vector3<f64>,
+    /// Moment about the centre (N m).
+    pub moment: Vector3<f64>,
+}
+
+/// Loads of all grains in the present step.
+#[derive(Clone, Debug, Default)]
+pub(crate) struct Loads {
+    /// Force (N) and moment (N m) on each grain; empty where a scene has no loads.
+    rows: Vec<[[f64; 4]; 2]>,
+    /// Steady loads by grain number.
+    given: Vec<Load>,
+    /// Rows of the grains in `given`.
+    places: Vec<u32>,
+    /// Sum of the forces on free grains that come from outside (N).
+    pub external: Vector3<f64>,
+}
+
+impl Loads {
+    /// Force and moment on a grain.
+    #[inline(always)]
+    pub fn of(&self, grain: usize) -> Option<&[[f64; 4]; 2]> {
+        self.rows.get(grain)
+    }
+
+    /// Whether grains are looked up by number.
+    pub fn looks_up(&self) -> bool {
+        !self.given.is_empty()
+    }
+
+    /// Finds the grains again after they have been sorted; loads of grains that have gone are dropped.
+    pub fn settle(&mut self, places: &Places) {
+        self.given.retain(|load| places.of(load.grain) != GONE);
+        self.places.clear();
+        self.places
+            .extend(self.given.iter().map(|load| places.of(load.grain)));
+    }
+
+    /// Lays the loads of the present positions.
+    pub fn fill(&mut self, grains: &Grains) {
+        self.external = Vector3::zeros();
+        self.rows.clear();
+        if self.given.is_empty() {
+            return;
+        }
+        self.rows.resize(grains.len(), [[0.0; 4]; 2]);
+        for (&at, load) in self.places.iter().zip(&self.given) {
+            let at = at as usize;
+            // What holds a fixed grain takes its load as well.
+            if !grains.is_fixed(at) {
+                add(&mut self.rows[at], &load.force, &load.moment);
+                self.external += load.force;
+            }
+        }
+    }
+
+    /// The steady loads with the rows of their grains.
+    pub fn given(&self) -> impl Iterator<Item = (usize, &Load)> {
+        self.places.iter().map(|&at| at as usize).zip(&self.given)
+    }
+
+    /// Writes the steady loads into a checkpoint.
+    pub fn record(&self, record: &mut Record) {
+        let grains = self.given.iter().map(|load| u64::from(load.grain));
+        record.counts.insert("loads/grain".into(), grains.collect());
+        let vectors = self.given.iter().flat_map(|load| [load.force, load.moment]);
+        let numbers = vectors.flat_map(|v| [v.x, v.y, v.z]).collect();
+        record.numbers.insert("loads/force_moment".into(), numbers);
+    }
+
+    /// Reads them back.
+    pub fn read(&mut self, record: &Record, grains: &Grains) -> Result<(), String> {
+        let of = record.counts("loads/grain")?;
+        let vectors = record.numbers("loads/force_moment")?;
+        if vectors.len() != 6 * of.len() {
+            return Err(
+                "arrays `loads/grain` and `loads/force_moment` do not fit each other".into(),
+            );
+        }
+        self.given = of
+            .iter()
+            .zip(vectors.as_chunks::<6>().0)
+            .map(|(&grain, &[fx, fy, fz, mx, my, mz])| {
+                let grain = u32::try_from(grain).map_err(|_| unknown_grain(grain))?;
+                Ok(Load {
+                    grain,
+                    force: Vector3::new(fx, fy, fz),
+                    moment: Vector3::new(mx, my, mz),
+                })
+            })
+            .collect::<Result<_, String>>()?;
+        let mut places = Places::default();
+        places.lay(grains);
+        let lost = self.given.iter().find(|l| places.of(l.grain) == GONE);
+        if let Some(load) = lost {
+            return Err(unknown_grain(load.grain.into()));
+        }
+        self.settle(&places);
+        Ok(())
+    }
+}
+
+fn unknown_grain(grain: u64) -> String {
+    format!("array `loads/grain` names grain {grain}, which is not there")
+}
+
+fn add(row: &mut [[f64; 4]; 2], force: &Vector3<f64>, moment: &Vector3<f64>) {
+    for (sum, part) in row.iter_mut().zip([force, moment]) {
+        for (sum, part) in sum.iter_mut().zip(part.iter()) {
+            *sum += part;
+        }
+    }
+}
+
+impl Simulation {
+    /// Puts steady loads on grains, in place of those there were; they act from now on.
+    ///
+    /// On a fixed grain a load does nothing. Removing a grain drops its load.
+    ///
+    /// # Errors
+    /// If a number is not finite or a grain is not there. Nothing has changed then.
+    pub fn set_loads(&mut self, loads: &[Load]) -> Result<(), SetupError> {
+        self.places.lay(&self.grains);
+        for (k, load) in loads.iter().enumerate() {
+            let known = self.places.of(load.grain) != GONE;
+            let key = format!("loads[{k}].grain");
+            check(&key, f64::from(load.grain), "the number of a grain", |_| {
+                known
+            })?;
+            for (name, v) in [("force", &load.force), ("moment", &load.moment)] {
+                for c in v.iter() {
+                    check(&format!("loads[{k}].{name}"), *c, "finite", |_| true)?;
+                }
+            }
+        }
+        self.forget_observation();
+        self.loads.given = loads.to_vec();
+        self.loads.settle(&self.places);
+        Ok(())
+    }
+}
