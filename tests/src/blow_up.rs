@@ -1,5 +1,6 @@
 //! Where steps blow up: every law on one contact and in a dense packing, against the estimates.
 
+use colluvium_dem::contact::hertz::secant_stiffness;
 use colluvium_dem::contact::tangential::SpringStiffness;
 use colluvium_dem::timestep::{Conditions, Shares, contact_limit};
 use colluvium_dem::{
@@ -180,8 +181,8 @@ impl Trial {
         let (r, x) = (self.radius, PRESSED * self.radius);
         match &self.law.normal {
             Normal::Hooke(hooke) => (x, hooke.stiffness * x),
-            Normal::Hertz(hertz) => (x, hertz.secant_stiffness(r, x) * x),
-            Normal::Viscoelastic(v) => (x, v.secant_stiffness(r, x) * x),
+            Normal::Hertz(hertz) => (x, secant_stiffness(hertz.effective_modulus, r, x) * x),
+            Normal::Viscoelastic(v) => (x, secant_stiffness(v.effective_modulus, r, x) * x),
             Normal::Jkr(jkr) => (jkr.equilibrium_overlap(r), 0.0),
         }
     }

@@ -5,6 +5,10 @@
 //! overlap's fourth root is the independent variable, in which solutions are smooth. In between,
 //! time is. Classical Runge–Kutta steps throughout; halving them changes nothing above 1e-11.
 
+use colluvium_dem::Hertz;
+use colluvium_dem::contact::hertz::impact_overlap;
+use std::f64::consts::PI;
+
 /// What a normal impact leaves.
 #[derive(Clone, Copy, Debug)]
 pub struct Rebound {
@@ -105,6 +109,27 @@ pub fn rebound(head: Head, force: impl Fn(f64, f64) -> f64) -> Rebound {
     }
 }
 
+/// A contact of elastic spheres with the matched dashpot (Kappel et al. 2020, Eq. 4–12), at a reduced
+/// mass (kg), reduced radius (m) and speed (m/s).
+pub fn elastic_spheres(law: &Hertz, mass: f64, radius: f64, speed: f64) -> Rebound {
+    let Hertz {
+        effective_modulus: modulus,
+        restitution: e,
+    } = *law;
+    let b = e.ln() / (e.ln().powi(2) + PI * PI).sqrt();
+    let head = Head {
+        mass,
+        speed,
+        scale: impact_overlap(modulus, mass, radius, speed),
+        pulls: true,
+    };
+    rebound(head, |x, v| {
+        let stiffness = 2.0 * modulus * (radius * x).sqrt();
+        let damping = -2.0 * (5.0_f64 / 6.0).sqrt() * b * (stiffness * mass).sqrt();
+        2.0 / 3.0 * stiffness * x + damping * v
+    })
+}
+
 fn runge_kutta(rate: &impl Fn(f64, [f64; 2]) -> [f64; 2], t: f64, s: [f64; 2], h: f64) -> [f64; 2] {
     let along = |k: [f64; 2], h: f64| [s[0] + h * k[0], s[1] + h * k[1]];
     let k1 = rate(t, s);
@@ -131,7 +156,6 @@ fn bisect(step: f64, holds: impl Fn(f64) -> bool) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use std::f64::consts::PI;
 
     fn head(speed: f64, scale: f64, pulls: bool) -> Head {
         Head {

@@ -16,7 +16,7 @@
 use colluvium_dem::contact::mindlin::SpringMemory;
 use colluvium_dem::{ContactLaw, Elasticity, Grain, Hertz, Lever, Normal, Tangential};
 use colluvium_tests::impacts::*;
-use colluvium_tests::rebound::{Head, Rebound, rebound};
+use colluvium_tests::rebound::elastic_spheres;
 use std::f64::consts::PI;
 
 const GLASS: (Elasticity, f64) = (material(48e9, 0.20), 2800.0);
@@ -46,26 +46,6 @@ fn on_radius(law: ContactLaw) -> ContactLaw {
         lever: Lever::Radius,
         ..law
     }
-}
-
-/// The normal impact by its own equation: Kappel et al. 2020, Eq. 4–12.
-fn normal_impact(law: &ContactLaw, mass: f64, radius: f64, speed: f64) -> Rebound {
-    let Hertz {
-        effective_modulus: modulus,
-        restitution: e,
-    } = hertz(law);
-    let b = e.ln() / (e.ln().powi(2) + PI * PI).sqrt();
-    let head = Head {
-        mass,
-        speed,
-        scale: hertz(law).impact_overlap(mass, radius, speed),
-        pulls: true,
-    };
-    rebound(head, |x, v| {
-        let stiffness = 2.0 * modulus * (radius * x).sqrt();
-        let damping = -2.0 * (5.0_f64 / 6.0).sqrt() * b * (stiffness * mass).sqrt();
-        2.0 / 3.0 * stiffness * x + damping * v
-    })
 }
 
 /// A step by a share of the elastic contact time.
@@ -144,7 +124,7 @@ fn test_4_oblique_impacts_on_a_rigid_plane() {
                 1e-9,
             );
             assert!(impact.gain < 0.0);
-            let pressing = normal_impact(&law, m, radius, vn).pressing(vn);
+            let pressing = elastic_spheres(&hertz(&law), m, radius, vn).pressing(vn);
             assert!(
                 vt - g.velocity.x <= mu * pressing * (1.0 + 1e-4),
                 "{degrees}°: more than friction gives"
@@ -235,7 +215,7 @@ fn test_4_sticking_impacts_follow_their_own_equation() {
 fn slides(law: ContactLaw, ball: Grain, mu: f64) {
     let (vn, m) = (-ball.velocity.z, ball.mass());
     let dt = step(&law, m, ball.radius, vn, 3000.0);
-    let pressing = normal_impact(&law, m, ball.radius, vn).pressing(vn);
+    let pressing = elastic_spheres(&hertz(&law), m, ball.radius, vn).pressing(vn);
     let impact = collide(&mut on_floor(law, ball, dt));
     let g = &impact.grains[0];
     // Velocity of the surface: v_x - r ω_y.
@@ -285,7 +265,7 @@ fn tests_7_and_8_two_spheres_with_spin() {
         let law = on_radius(elastic(elasticity, elasticity, e, mu));
         let [a, b] = sizes.map(|r| mass(r, density));
         let (m, radius) = (a * b / (a + b), 1.0 / (1.0 / sizes[0] + 1.0 / sizes[1]));
-        let pressing = normal_impact(&law, m, radius, 2.0 * v).pressing(2.0 * v);
+        let pressing = elastic_spheres(&hertz(&law), m, radius, 2.0 * v).pressing(2.0 * v);
         for spin in [-60.0, 30.0, 60.0, 120.0] {
             let lower = sphere(sizes[0], density, [0.0, 0.0, v], [0.0, spin, 0.0]);
             let upper = sphere(sizes[1], density, [0.0, 0.0, -v], [0.0, spin, 0.0]);

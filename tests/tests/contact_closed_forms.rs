@@ -3,6 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use colluvium_dem::contact::Damping;
+use colluvium_dem::contact::hertz::secant_stiffness;
 use colluvium_dem::{
     Cohesion, ContactLaw, Elasticity, Epsd, Grain, Hooke, Jkr, Lever, Normal, Partner, Rolling,
     ShapeParameter, Simulation, SpringStiffness, Tangential, TangentialSpring, Viscoelastic,
@@ -35,7 +36,7 @@ fn resting(law: ContactLaw, velocity: [f64; 3], spin: [f64; 3], steps: f64) -> S
     for _ in 0..200 {
         overlap = match law.normal {
             Normal::Hooke(h) => mass() * G / h.stiffness,
-            Normal::Hertz(h) => mass() * G / h.secant_stiffness(R, overlap),
+            Normal::Hertz(h) => mass() * G / secant_stiffness(h.effective_modulus, R, overlap),
             _ => unreachable!("not used with others"),
         };
     }

@@ -11,9 +11,9 @@
 #![allow(clippy::unwrap_used)]
 
 use colluvium_dem::contact::mindlin::SpringMemory;
-use colluvium_dem::{ContactLaw, Elasticity, Hertz, Lever, Normal, Tangential};
+use colluvium_dem::{ContactLaw, Elasticity, Hertz, Lever, Tangential};
 use colluvium_tests::impacts::*;
-use colluvium_tests::rebound::{Head, Rebound, rebound};
+use colluvium_tests::rebound::elastic_spheres;
 use std::f64::consts::PI;
 
 const GLASS: Elasticity = material(48e9, 0.2);
@@ -174,29 +174,6 @@ fn c_oblique_impacts() {
     }
 }
 
-/// The normal impact by its own equation.
-fn normal_impact(law: &ContactLaw, mass: f64, radius: f64, speed: f64) -> Rebound {
-    let Normal::Hertz(hertz) = law.normal else {
-        unreachable!("these are Hertz contacts");
-    };
-    let Hertz {
-        effective_modulus: modulus,
-        restitution: e,
-    } = hertz;
-    let b = e.ln() / (e.ln().powi(2) + PI * PI).sqrt();
-    let head = Head {
-        mass,
-        speed,
-        scale: hertz.impact_overlap(mass, radius, speed),
-        pulls: true,
-    };
-    rebound(head, |x, v| {
-        let stiffness = 2.0 * modulus * (radius * x).sqrt();
-        let damping = -2.0 * (5.0_f64 / 6.0).sqrt() * b * (stiffness * mass).sqrt();
-        2.0 / 3.0 * stiffness * x + damping * v
-    })
-}
-
 /// Friction over its limit at the most, and steps at which it drives the slip.
 #[derive(Default)]
 struct Friction {
@@ -224,7 +201,12 @@ fn d_a_spinning_sphere_on_a_plane() {
         SpringMemory::Energy,
         Lever::Radius,
     );
-    let normal = normal_impact(&law, 4.0 / 3.0 * PI * 1e-3 * 2699.0, 0.1, 0.2);
+    let normal = elastic_spheres(
+        &Hertz::of(ALLOY, 0.5),
+        4.0 / 3.0 * PI * 1e-3 * 2699.0,
+        0.1,
+        0.2,
+    );
     assert_close("restitution", normal.speed / 0.2, 0.5, 1e-9);
     let exact = 0.4 * normal.pressing(0.2);
     assert_close("exact", exact, 0.128_045_3, 1e-6);
@@ -273,7 +255,8 @@ fn e_two_spinning_spheres() {
         Lever::Radius,
     );
     let m = 4.0 / 3.0 * PI * 1e-3 * 2699.0;
-    let exact = 0.5 * 0.4 * normal_impact(&law, 0.5 * m, 0.05, 0.4).pressing(0.4);
+    let exact =
+        0.5 * 0.4 * elastic_spheres(&Hertz::of(ALLOY, 0.5), 0.5 * m, 0.05, 0.4).pressing(0.4);
     assert_close("exact", exact, 0.128_045_3, 1e-6);
     for (spin, lammps, liggghts) in [
         (5.0, -0.107_002, -0.140_034),

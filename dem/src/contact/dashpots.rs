@@ -1,6 +1,6 @@
 //! Dashpots of a contact against small motions, for the limits of the time step.
 
-use super::hertz::damping_factor;
+use super::hertz::{damping_factor, secant_stiffness};
 use super::{ContactLaw, Normal, Rolling, Stiffness, Tangential};
 
 /// Two surfaces about to touch, by what their laws need.
@@ -47,7 +47,9 @@ impl ContactLaw {
                 let s_n = 2.0 * hertz.effective_modulus * contact_radius;
                 damping_factor(hertz.restitution) * (s_n * mass).sqrt()
             }
-            Normal::Viscoelastic(v) => v.dissipation * v.secant_stiffness(radius, overlap),
+            Normal::Viscoelastic(v) => {
+                v.dissipation * secant_stiffness(v.effective_modulus, radius, overlap)
+            }
             Normal::Jkr(jkr) => jkr.damping_rate * mass,
         };
         let tangential = match &self.tangential {

@@ -84,6 +84,39 @@ pub enum Normal {
     Jkr(Jkr),
 }
 
+impl Normal {
+    /// E* (Pa) of elastic spheres; linear springs have none.
+    pub fn elastic_modulus(&self) -> Option<f64> {
+        match self {
+            Normal::Hooke(_) => None,
+            Normal::Hertz(hertz) => Some(hertz.effective_modulus),
+            Normal::Viscoelastic(v) => Some(v.effective_modulus),
+            Normal::Jkr(jkr) => Some(jkr.effective_modulus()),
+        }
+    }
+
+    /// Stiffness against a small motion about `overlap`, and force over overlap where the force is
+    /// elastic alone (N/m, N/m).
+    fn stiffness(&self, reduced_radius: f64, overlap: f64) -> (f64, f64) {
+        match self {
+            Normal::Hooke(hooke) => (hooke.stiffness, hooke.stiffness),
+            Normal::Hertz(Hertz {
+                effective_modulus, ..
+            })
+            | Normal::Viscoelastic(Viscoelastic {
+                effective_modulus, ..
+            }) => {
+                let secant = hertz::secant_stiffness(*effective_modulus, reduced_radius, overlap);
+                (1.5 * secant, secant)
+            }
+            Normal::Jkr(jkr) => {
+                let tangent = jkr.stiffness(reduced_radius, overlap);
+                (tangent, tangent)
+            }
+        }
+    }
+}
+
 /// Tangential part of a law.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -176,16 +209,7 @@ impl ContactLaw {
     /// Stiffness of a contact under `overlap` (m) at a reduced radius (m): what a small motion about
     /// that state meets. (N/m, N/m, N m/rad, N m/rad)
     pub fn stiffness(&self, reduced_radius: f64, overlap: f64) -> Stiffness {
-        let normal = match &self.normal {
-            Normal::Hooke(hooke) => hooke.stiffness,
-            Normal::Hertz(hertz) => 1.5 * hertz.secant_stiffness(reduced_radius, overlap),
-            Normal::Viscoelastic(v) => 1.5 * v.secant_stiffness(reduced_radius, overlap),
-            Normal::Jkr(jkr) => jkr.stiffness(reduced_radius, overlap),
-        };
-        let secant = match &self.normal {
-            Normal::Hertz(_) | Normal::Viscoelastic(_) => normal / 1.5,
-            _ => normal,
-        };
+        let (normal, secant) = self.normal.stiffness(reduced_radius, overlap);
         let tangential = match (&self.tangential, &self.normal) {
             (Tangential::None, _) => 0.0,
             (Tangential::Linear(spring), _) => spring.stiffness(secant),
@@ -219,8 +243,12 @@ impl ContactLaw {
     pub fn contact_time(&self, reduced_mass: f64, reduced_radius: f64, speed: f64) -> f64 {
         match &self.normal {
             Normal::Hooke(hooke) => hooke.contact_time(reduced_mass),
-            Normal::Hertz(hertz) => hertz.contact_time(reduced_mass, reduced_radius, speed),
-            Normal::Viscoelastic(v) => v.contact_time(reduced_mass, reduced_radius, speed),
+            Normal::Hertz(Hertz {
+                effective_modulus, ..
+            })
+            | Normal::Viscoelastic(Viscoelastic {
+                effective_modulus, ..
+            }) => hertz::impact_time(*effective_modulus, reduced_mass, reduced_radius, speed),
             Normal::Jkr(jkr) => {
                 let stiffness =
                     jkr.stiffness(reduced_radius, jkr.equilibrium_overlap(reduced_radius));

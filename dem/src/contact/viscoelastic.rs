@@ -11,7 +11,7 @@
 
 use super::Touch;
 use super::composition::{NormalPart, Pressing};
-use super::hertz::{Elasticity, IMPACT_TIME, impact_overlap};
+use super::hertz::Elasticity;
 use crate::lanes::Lane;
 use serde::{Deserialize, Serialize};
 
@@ -31,21 +31,6 @@ impl Viscoelastic {
             effective_modulus: material.effective_modulus(&material),
             dissipation,
         }
-    }
-
-    /// 4/3 E* √(R x) (N/m).
-    pub fn secant_stiffness(&self, reduced_radius: f64, overlap: f64) -> f64 {
-        4.0 / 3.0 * self.effective_modulus * (reduced_radius * overlap).sqrt()
-    }
-
-    /// Overlap of an elastic impact (m).
-    pub fn impact_overlap(&self, reduced_mass: f64, reduced_radius: f64, speed: f64) -> f64 {
-        impact_overlap(self.effective_modulus, reduced_mass, reduced_radius, speed)
-    }
-
-    /// Duration of an elastic impact (s).
-    pub fn contact_time(&self, reduced_mass: f64, reduced_radius: f64, speed: f64) -> f64 {
-        IMPACT_TIME * self.impact_overlap(reduced_mass, reduced_radius, speed) / speed
     }
 
     pub(super) fn coefficients(&self) -> [f64; 2] {

@@ -1,7 +1,7 @@
 //! What a scene expects its grains to meet, and how far from each limit it stays.
 
 use super::bodies::Body;
-use crate::contact::{ContactLaw, Inertia, Normal};
+use crate::contact::{ContactLaw, Inertia, Normal, hertz};
 use crate::grains::Grain;
 use nalgebra::Vector3;
 
@@ -113,7 +113,7 @@ pub(super) fn overlap(
     let load = expected.pressure * breadth + law.cohesion.force(radius);
     let speed = expected.speed;
     let elastic = |modulus: f64| {
-        let struck = (15.0 * mass * speed * speed / (16.0 * modulus * radius.sqrt())).powf(0.4);
+        let struck = hertz::impact_overlap(modulus, mass, radius, speed);
         let pressed = (0.75 * load / (modulus * radius.sqrt())).powf(2.0 / 3.0);
         struck.max(pressed)
     };

@@ -26,7 +26,7 @@ mod expected;
 mod limit;
 mod stability;
 
-use crate::contact::{ContactLaw, Elasticity, Hertz, LawTable, Mindlin, Normal, Tangential};
+use crate::contact::{ContactLaw, Elasticity, LawTable, Mindlin, Normal, Tangential, hertz};
 use crate::grains::Grain;
 use bodies::surfaces;
 pub(crate) use bodies::{Body, Classes};
@@ -210,17 +210,11 @@ pub fn choose(mut limits: Vec<Limit>, safety: f64) -> Choice {
 
 /// `2.87 (m²/(R E*² v))^{1/5}`, infinite at rest.
 fn hertz_time(law: &ContactLaw, mass: f64, radius: f64, speed: f64) -> f64 {
-    let modulus = match &law.normal {
-        Normal::Hooke(_) => return f64::INFINITY,
-        Normal::Hertz(hertz) => hertz.effective_modulus,
-        Normal::Viscoelastic(v) => v.effective_modulus,
-        Normal::Jkr(jkr) => jkr.effective_modulus(),
-    };
-    Hertz {
-        effective_modulus: modulus,
-        restitution: 1.0,
-    }
-    .contact_time(mass, radius, speed)
+    law.normal
+        .elastic_modulus()
+        .map_or(f64::INFINITY, |modulus| {
+            hertz::impact_time(modulus, mass, radius, speed)
+        })
 }
 
 /// `π R √(ρ/G)/(0.1631 ν + 0.8766)` (s) of a law's like pair; infinite for linear springs, which carry
@@ -229,11 +223,11 @@ fn hertz_time(law: &ContactLaw, mass: f64, radius: f64, speed: f64) -> f64 {
 /// A law keeps `E* = E/(2(1 - ν²))` and, with Mindlin, `G* = E/(4(2 - ν)(1 + ν))`, so that
 /// `E*/G* = 2(2 - ν)/(1 - ν)` gives ν back. Without Mindlin ν = 0 stands in: the shortest of all ν ≥ 0.
 fn rayleigh_time(law: &ContactLaw, radius: f64, density: f64) -> f64 {
-    let modulus = match &law.normal {
-        Normal::Hooke(_) => return f64::INFINITY,
-        Normal::Hertz(hertz) => hertz.effective_modulus,
-        Normal::Viscoelastic(v) => v.effective_modulus,
-        Normal::Jkr(jkr) => return rayleigh(&jkr.elasticity, radius, density),
+    if let Normal::Jkr(jkr) = &law.normal {
+        return rayleigh(&jkr.elasticity, radius, density);
+    }
+    let Some(modulus) = law.normal.elastic_modulus() else {
+        return f64::INFINITY;
     };
     let poisson = match &law.tangential {
         Tangential::Mindlin(Mindlin {

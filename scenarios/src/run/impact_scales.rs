@@ -1,19 +1,21 @@
 //! How deep and how long spheres press each other, for any normal law: what time steps, durations
 //! and plans are measured by.
 
-use colluvium_dem::{ContactLaw, Hertz, Jkr, Normal};
+use colluvium_dem::contact::hertz;
+use colluvium_dem::{ContactLaw, Normal};
 use std::f64::consts::PI;
 
 /// Overlap of an undamped impact (m).
 pub fn overlap(law: &ContactLaw, reduced_mass: f64, reduced_radius: f64, speed: f64) -> f64 {
+    let elastic =
+        |modulus: f64| hertz::impact_overlap(modulus, reduced_mass, reduced_radius, speed);
     match &law.normal {
         Normal::Hooke(hooke) => speed * (reduced_mass / hooke.stiffness).sqrt(),
-        Normal::Hertz(hertz) => hertz.impact_overlap(reduced_mass, reduced_radius, speed),
-        Normal::Viscoelastic(v) => v.impact_overlap(reduced_mass, reduced_radius, speed),
+        Normal::Hertz(hertz) => elastic(hertz.effective_modulus),
+        Normal::Viscoelastic(v) => elastic(v.effective_modulus),
         // Adhesion pulls the spheres together first; the rest is as without it.
         Normal::Jkr(jkr) => {
-            jkr.equilibrium_overlap(reduced_radius)
-                + without_adhesion(jkr).impact_overlap(reduced_mass, reduced_radius, speed)
+            jkr.equilibrium_overlap(reduced_radius) + elastic(jkr.effective_modulus())
         }
     }
 }
@@ -26,28 +28,21 @@ pub fn half_period(law: &ContactLaw, reduced_mass: f64, reduced_radius: f64, ove
 
 /// Duration of an undamped impact (s); of a bound contact, half its period.
 pub fn duration(law: &ContactLaw, reduced_mass: f64, reduced_radius: f64, speed: f64) -> f64 {
-    let elastic = match &law.normal {
-        Normal::Hooke(hooke) => return PI * (reduced_mass / hooke.stiffness).sqrt(),
-        Normal::Hertz(hertz) => hertz.contact_time(reduced_mass, reduced_radius, speed),
-        Normal::Viscoelastic(v) => v.contact_time(reduced_mass, reduced_radius, speed),
-        Normal::Jkr(jkr) => {
-            let bound = jkr.equilibrium_overlap(reduced_radius);
-            let swing = half_period(law, reduced_mass, reduced_radius, bound);
-            without_adhesion(jkr)
-                .contact_time(reduced_mass, reduced_radius, speed)
-                .min(swing)
-        }
+    let swing = |overlap| half_period(law, reduced_mass, reduced_radius, overlap);
+    let Some(modulus) = law.normal.elastic_modulus() else {
+        // A linear spring has one time at all overlaps.
+        return swing(0.0);
     };
+    let mut elastic = hertz::impact_time(modulus, reduced_mass, reduced_radius, speed);
+    if let Normal::Jkr(jkr) = &law.normal {
+        elastic = elastic.min(swing(jkr.equilibrium_overlap(reduced_radius)));
+    }
     if elastic.is_finite() && elastic > 0.0 {
         elastic
     } else {
         // No impact: the swing under a thousandth of the radius.
-        half_period(law, reduced_mass, reduced_radius, 1e-3 * reduced_radius)
+        swing(1e-3 * reduced_radius)
     }
-}
-
-fn without_adhesion(jkr: &Jkr) -> Hertz {
-    Hertz::of(jkr.elasticity, 1.0)
 }
 
 #[cfg(test)]
