@@ -52,6 +52,17 @@ pub struct Shear<L> {
     pub damping: L,
 }
 
+/// Rolling and twisting springs as a step finds them.
+#[derive(Clone, Copy)]
+pub struct Wound<L> {
+    /// Rolling displacement (rad).
+    pub rolled: Vec3<L>,
+    /// Twisting displacement (rad).
+    pub twisted: L,
+    /// Share of them that a stiffer contact keeps.
+    pub kept: L,
+}
+
 /// What the rolling part does.
 #[derive(Clone, Copy)]
 pub struct Turn<L> {
@@ -114,14 +125,11 @@ pub trait RollingPart: Copy + Send + Sync {
     const STIFFENS: bool;
     /// Whether it reads `Touch::inverse_inertia`.
     const INERTIA: bool;
-    /// Moment, from the springs as they were and the share that a stiffer contact keeps.
-    #[allow(clippy::too_many_arguments)]
+    /// Moment, from the springs as they were.
     fn turn<L: Lane>(
         c: &[L],
         touch: &Touch<L>,
-        rolled: Vec3<L>,
-        twisted: L,
-        kept: L,
+        wound: &Wound<L>,
         pressing: &Pressing<L>,
         shear: &Shear<L>,
         step: Step,
@@ -178,9 +186,7 @@ impl RollingPart for Free {
     fn turn<L: Lane>(
         _: &[L],
         _: &Touch<L>,
-        _: Vec3<L>,
-        _: L,
-        _: L,
+        _: &Wound<L>,
         _: &Pressing<L>,
         _: &Shear<L>,
         _: Step,
@@ -304,13 +310,16 @@ where
         let mut moment = Vec3::zero();
         if R::SPRING {
             let from = Layout::<N, T, R>::ROLLED;
-            let twisted = if R::TWISTS {
-                history[Layout::<N, T, R>::FLIPS]
-            } else {
-                L::splat(0.0)
+            let wound = Wound {
+                rolled: vector(history, from),
+                twisted: if R::TWISTS {
+                    history[Layout::<N, T, R>::FLIPS]
+                } else {
+                    L::splat(0.0)
+                },
+                kept,
             };
-            let rolled = vector(history, from);
-            let turn = R::turn(r, touch, rolled, twisted, kept, &pressing, &shear, step);
+            let turn = R::turn(r, touch, &wound, &pressing, &shear, step);
             history[from..from + 3].copy_from_slice(&turn.rolled.0);
             if R::TWISTS {
                 history[Layout::<N, T, R>::FLIPS] = turn.twisted;

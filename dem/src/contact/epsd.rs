@@ -10,10 +10,10 @@
 //! the dashpot is switched off while the spring slips; here both are limited together
 //! ([`super::slider`]), which takes the switch's jump away and cannot exceed the limit either.
 
-use super::composition::{Pressing, RollingPart, Shear, Turn};
+use super::composition::{Pressing, RollingPart, Shear, Turn, Wound};
 use super::slider::slide;
 use super::{Step, Touch};
-use crate::lanes::{Lane, Vec3};
+use crate::lanes::Lane;
 use serde::{Deserialize, Serialize};
 
 /// Elastic–plastic rolling resistance.
@@ -59,9 +59,7 @@ impl RollingPart for Rolls {
     fn turn<L: Lane>(
         c: &[L],
         touch: &Touch<L>,
-        rolled: Vec3<L>,
-        twisted: L,
-        kept: L,
+        wound: &Wound<L>,
         pressing: &Pressing<L>,
         _: &Shear<L>,
         step: Step,
@@ -71,14 +69,14 @@ impl RollingPart for Rolls {
         let inertia = L::splat(ABOUT_THE_CONTACT) / touch.inverse_inertia;
         let damping = L::splat(2.0) * c[1] * (stiffness * inertia).sqrt();
         let rate = touch.spin.reject(touch.normal);
-        let stretched =
-            (rolled.scale(kept) + rate.scale(L::splat(step.stretch))).reject(touch.normal);
+        let stretched = (wound.rolled.scale(wound.kept) + rate.scale(L::splat(step.stretch)))
+            .reject(touch.normal);
         let limit = arm * pressing.force.abs();
         let (resistance, rolled) = slide(stretched, rate, stiffness, damping, limit);
         Turn {
             moment: -resistance,
             rolled,
-            twisted,
+            twisted: wound.twisted,
         }
     }
 
@@ -90,6 +88,7 @@ impl RollingPart for Rolls {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lanes::Vec3;
 
     #[test]
     fn stiffness_damping_and_limit_are_those_of_the_paper() {
@@ -117,18 +116,12 @@ mod tests {
         };
         let step = Step { stretch: 1e-3 };
         let c = [0.2, 0.3];
-        let turn = |spin| {
-            Rolls::turn(
-                &c,
-                &touch(spin),
-                Vec3::zero(),
-                0.0,
-                1.0,
-                &pressing,
-                &shear,
-                step,
-            )
+        let slack = Wound {
+            rolled: Vec3::zero(),
+            twisted: 0.0,
+            kept: 1.0,
         };
+        let turn = |spin| Rolls::turn(&c, &touch(spin), &slack, &pressing, &shear, step);
         let k = 2.25 * 1000.0 * 0.01;
         let damping: f64 = 2.0 * 0.3 * f64::sqrt(k * (0.4 + 1.0) * 0.25);
         let slow = turn(1e-4);

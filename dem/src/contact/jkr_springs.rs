@@ -10,7 +10,7 @@
 //! keep their critical displacement, whatever the load, also in tension.
 //! Source: Dominik & Tielens 1997 and Wada et al. 2007, as used by Tatsuuma et al. 2019.
 
-use super::composition::{Pressing, RollingPart, Shear, TangentialPart, Turn};
+use super::composition::{Pressing, RollingPart, Shear, TangentialPart, Turn, Wound};
 use super::jkr::Jkr;
 use super::slider::{slide, slide_scalar};
 use super::{Step, Touch};
@@ -121,9 +121,7 @@ impl RollingPart for Rolls {
     fn turn<L: Lane>(
         c: &[L],
         touch: &Touch<L>,
-        rolled: Vec3<L>,
-        twisted: L,
-        _: L,
+        wound: &Wound<L>,
         _: &Pressing<L>,
         _: &Shear<L>,
         step: Step,
@@ -136,14 +134,14 @@ impl RollingPart for Rolls {
         let rolling_stiffness = c[0] * radius * radius;
         let twisting_stiffness = c[2] * radius * radius;
         let (rolling, rolled) = slide(
-            (rolled + roll_rate.scale(stretch)).reject(touch.normal),
+            (wound.rolled + roll_rate.scale(stretch)).reject(touch.normal),
             roll_rate,
             rolling_stiffness,
             zero,
             c[0] * radius * c[1],
         );
         let (twisting, twisted) = slide_scalar(
-            twisted + twist_rate * stretch,
+            wound.twisted + twist_rate * stretch,
             twist_rate,
             twisting_stiffness,
             zero,

@@ -13,10 +13,10 @@
 //! parts; over a Hertz contact k_n is the secant stiffness. Source: Thuillet 2019, Eq. 2.11–2.13 (after Zhang et al.
 //! 2017). The limit acts as [`super::slider`] says; the source limits the spring only.
 
-use super::composition::{Pressing, RollingPart, Shear, Turn};
+use super::composition::{Pressing, RollingPart, Shear, Turn, Wound};
 use super::slider::{slide, slide_scalar};
 use super::{Step, Tangential, Touch};
-use crate::lanes::{Lane, Vec3};
+use crate::lanes::Lane;
 use serde::{Deserialize, Serialize};
 
 /// Angularity of grains.
@@ -70,9 +70,7 @@ impl RollingPart for Springs {
     fn turn<L: Lane>(
         c: &[L],
         touch: &Touch<L>,
-        rolled: Vec3<L>,
-        twisted: L,
-        kept: L,
+        wound: &Wound<L>,
         pressing: &Pressing<L>,
         shear: &Shear<L>,
         step: Step,
@@ -86,14 +84,14 @@ impl RollingPart for Springs {
         let twist_rate = touch.spin.dot(touch.normal);
         let roll_rate = touch.spin - touch.normal.scale(twist_rate);
         let (rolling, rolled) = slide(
-            (rolled.scale(kept) + roll_rate.scale(stretch)).reject(touch.normal),
+            (wound.rolled.scale(wound.kept) + roll_rate.scale(stretch)).reject(touch.normal),
             roll_rate,
             pressing.stiffness * patch2,
             pressing.damping * patch2,
             c[1] * limit,
         );
         let (twisting, twisted) = slide_scalar(
-            twisted * kept + twist_rate * stretch,
+            wound.twisted * wound.kept + twist_rate * stretch,
             twist_rate,
             two * shear.stiffness * patch2,
             two * shear.damping * patch2,
@@ -115,6 +113,7 @@ impl RollingPart for Springs {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::lanes::Vec3;
 
     /// Equal grains of radius 1 (R = 1/2), k_n 1000, k_t 2000/7, no dashpots, μ 0.5.
     fn moment(beta: f64, spin: [f64; 3], load: f64) -> Turn<f64> {
@@ -141,7 +140,12 @@ mod tests {
         };
         let c = [beta, 1.05, 1.3 * 0.5];
         let step = Step { stretch: 1e-3 };
-        Springs::turn(&c, &touch, Vec3::zero(), 0.0, 1.0, &pressing, &shear, step)
+        let slack = Wound {
+            rolled: Vec3::zero(),
+            twisted: 0.0,
+            kept: 1.0,
+        };
+        Springs::turn(&c, &touch, &slack, &pressing, &shear, step)
     }
 
     #[test]
