@@ -101,6 +101,7 @@ impl Simulation {
             ],
         );
         self.loads.record(&mut record);
+        self.bonds.record(&mut record);
         record
     }
 
@@ -241,6 +242,7 @@ impl Simulation {
         self.list.partner = partner;
         self.list.restore(levels);
         self.loads.read(record, &grains)?;
+        self.bonds.read(record, &grains)?;
         self.grains = grains;
         self.weigh();
 

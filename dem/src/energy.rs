@@ -20,6 +20,9 @@ pub struct Energy {
     pub rolling: f64,
     /// Twisting springs, Σ k_T δ_T²/2.
     pub twisting: f64,
+    /// Bonds.
+    #[serde(default)]
+    pub bonds: f64,
 }
 
 impl Energy {
@@ -28,9 +31,9 @@ impl Energy {
         self.translation + self.rotation
     }
 
-    /// Energy of all contacts (J).
+    /// Energy of all contacts and bonds (J).
     pub fn elastic(&self) -> f64 {
-        self.normal + self.cohesion + self.tangential + self.rolling + self.twisting
+        self.normal + self.cohesion + self.tangential + self.rolling + self.twisting + self.bonds
     }
 
     /// Kinetic and elastic energy (J).

@@ -5,13 +5,14 @@
 //! moved grains adds up to the kinetic energy *to round-off*, at any time step:
 //!
 //! ```text
-//! K(now) = K(start) + Σ W_channel + W_gravity + W_drive + W_loads
+//! K(now) = K(start) + Σ W_channel + W_gravity + W_drive + W_loads + W_bonds
 //! dissipated by a channel = -W_channel - (E_channel(now) - E_channel(start))
 //! ```
 //! E_channel is the energy that the law says its springs hold, so a channel that dissipates less than
 //! nothing shows a law that creates energy, or a step too long for it. The normal channel also loses
 //! what adhesive contacts lose when they are made and broken.
 
+use crate::bonds::Bond;
 use crate::contact::Stored;
 use crate::grains::{SPHERE_INERTIA, vector};
 use crate::planes::Plane;
@@ -48,6 +49,34 @@ impl Channels {
     }
 }
 
+/// Energy by way of bonds (J).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Bonding {
+    /// Work on grains since the ledger was opened.
+    pub work: f64,
+    /// Elastic energy when it was opened.
+    pub stored_before: f64,
+    /// Elastic energy now.
+    pub stored: f64,
+    /// Energy that broken and cut bonds had held, when it was opened.
+    pub freed_before: f64,
+    /// The same now.
+    pub freed: f64,
+}
+
+impl Bonding {
+    /// What breaking and cutting have cost since the ledger was opened (J).
+    pub fn broken(&self) -> f64 {
+        self.freed - self.freed_before
+    }
+
+    /// What grains have put into bonds that is neither stored nor broken (J): bonds have no dashpot,
+    /// so this is the error of the step, and it falls with its square.
+    pub fn lost(&self) -> f64 {
+        -self.work - (self.stored - self.stored_before) - self.broken()
+    }
+}
+
 /// What has happened to the energy of the free grains since the ledger was opened (J).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct EnergyLedger {
@@ -64,6 +93,9 @@ pub struct EnergyLedger {
     /// Work of steady loads.
     #[serde(default)]
     pub loads: f64,
+    /// Work of bonds on grains.
+    #[serde(default)]
+    pub bonds: Bonding,
     /// Energy in contacts when it was opened.
     pub stored_before: Channels,
     /// Energy in contacts now.
@@ -85,7 +117,7 @@ impl EnergyLedger {
 
     /// What is not accounted for, relative to the largest entry: round-off.
     pub fn error(&self) -> f64 {
-        let put_in = self.work.sum() + self.gravity + self.drive + self.loads;
+        let put_in = self.work.sum() + self.gravity + self.drive + self.loads + self.bonds.work;
         let entries = [
             self.kinetic_before,
             self.kinetic,
@@ -95,6 +127,7 @@ impl EnergyLedger {
             self.gravity,
             self.drive,
             self.loads,
+            self.bonds.work,
         ];
         let scale = entries.iter().fold(0.0_f64, |a, e| a.max(e.abs()));
         if scale > 0.0 {
@@ -108,10 +141,12 @@ impl EnergyLedger {
 impl EnergyLedger {
     /// All entries, for a checkpoint.
     pub(crate) fn numbers(&self) -> Vec<f64> {
+        let bonds = &self.bonds;
         let channels = |c: &Channels| [c.normal, c.tangential, c.rolling, c.twisting];
         [
             [self.kinetic_before, self.kinetic, self.gravity, self.drive],
-            [self.loads, 0.0, 0.0, 0.0],
+            [self.loads, bonds.work, bonds.stored_before, bonds.stored],
+            [bonds.freed_before, bonds.freed, 0.0, 0.0],
             channels(&self.work),
             channels(&self.stored_before),
             channels(&self.stored),
@@ -138,8 +173,22 @@ impl EnergyLedger {
                 _ => Err("array `energy_ledger` is too short".into()),
             };
         };
+        let wrong = || String::from("array `energy_ledger` must have 24 numbers");
+        let &[
+            bond_work,
+            before,
+            now,
+            freed_before,
+            freed,
+            _,
+            _,
+            ref rest @ ..,
+        ] = rest
+        else {
+            return Err(wrong());
+        };
         let [work, stored_before, stored] = rest.as_chunks::<4>().0 else {
-            return Err("array `energy_ledger` must have 20 numbers".into());
+            return Err(wrong());
         };
         let channels = |&[normal, tangential, rolling, twisting]: &[f64; 4]| Channels {
             normal,
@@ -154,6 +203,13 @@ impl EnergyLedger {
             gravity,
             drive,
             loads,
+            bonds: Bonding {
+                work: bond_work,
+                stored_before: before,
+                stored: now,
+                freed_before,
+                freed,
+            },
             stored_before: channels(stored_before),
             stored: channels(stored),
         }))
@@ -175,7 +231,15 @@ impl Simulation {
     pub fn open_energy_ledger(&mut self) {
         let kinetic = self.energy().kinetic();
         let stored = self.stored_energy();
+        let (bonded, freed) = (self.bond_energy(), self.bonds.count().energy_freed);
         self.ledger = Some(EnergyLedger {
+            bonds: Bonding {
+                work: 0.0,
+                stored_before: bonded,
+                stored: bonded,
+                freed_before: freed,
+                freed,
+            },
             kinetic_before: kinetic,
             kinetic,
             stored_before: Channels::of(&stored),
@@ -201,6 +265,8 @@ impl Simulation {
         let mut ledger = self.ledger.replace(before)?;
         ledger.kinetic = self.energy().kinetic();
         ledger.stored = Channels::of(&stored);
+        ledger.bonds.stored = self.bond_energy();
+        ledger.bonds.freed = self.bonds.count().energy_freed;
         Some(ledger)
     }
 
@@ -272,6 +338,16 @@ impl Simulation {
                         + slot
                             .get(2)
                             .map_or(0.0, |m| sign * vector(m).dot(&side.spin));
+                    ledger.drive -= kick * power;
+                }
+            }
+        }
+        for Bond { rows, pull, .. } in self.bonds.whole() {
+            let sides = rows.map(|row| &moving[row as usize]);
+            for ((side, sign), moment) in sides.into_iter().zip([1.0, -1.0]).zip(&pull.moments) {
+                let power = sign * pull.force.dot(&side.velocity) + moment.dot(&side.spin);
+                ledger.bonds.work += kick * power;
+                if side.fixed {
                     ledger.drive -= kick * power;
                 }
             }

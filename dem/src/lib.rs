@@ -8,6 +8,7 @@
 //! SI units; overlap and compression positive; x downslope, y across, z away from the ground.
 //! Results are the same bits for any number of threads and after a restart from a [`Record`].
 
+mod bonds;
 mod checkpoint;
 pub mod contact;
 mod contacts;
@@ -28,6 +29,7 @@ mod population;
 pub mod preparation;
 mod reach;
 mod record;
+mod region;
 mod setup;
 mod simulation;
 mod snapshot;
@@ -36,6 +38,9 @@ mod sweep;
 pub mod timestep;
 mod validity;
 
+pub use bonds::{
+    BondCount, BondRule, BondState, BondStress, Cement, Cluster, Clusters, Section as BondSection,
+};
 pub use contact::{
     Cohesion, ContactLaw, Damping, Elasticity, Epsd, Hertz, Hooke, Jkr, LawTable, Laws, Lever,
     Mindlin, Normal, Rolling, ShapeParameter, SpringStiffness, Tangential, TangentialSpring,
@@ -44,11 +49,12 @@ pub use contact::{
 pub use domain::Domain;
 pub use energy::Energy;
 pub use grains::Grain;
-pub use ledger::{Channels, EnergyLedger};
+pub use ledger::{Bonding, Channels, EnergyLedger};
 pub use loads::Load;
 pub use planes::Plane;
 pub use record::Record;
+pub use region::Region;
 pub use setup::{Setup, SetupError, Threads};
 pub use simulation::{Diverged, Simulation};
-pub use snapshot::{ContactSample, GrainSample, Partner, Snapshot};
+pub use snapshot::{BondSample, ContactSample, GrainSample, Partner, Snapshot};
 pub use state_hash::StateHash;

@@ -8,6 +8,7 @@
 //! ```
 //! Rows exist only where a scene has loads, so that others pay one comparison a grain.
 
+use crate::bonds::{Bond, Bonds};
 use crate::grains::Grains;
 use crate::places::Places;
 use crate::population::GONE;
@@ -47,27 +48,23 @@ impl Loads {
         self.rows.get(grain)
     }
 
-    /// Whether grains are looked up by number.
-    pub fn looks_up(&self) -> bool {
-        !self.given.is_empty()
-    }
-
     /// Finds the grains again after they have been sorted; loads of grains that have gone are dropped.
-    pub fn settle(&mut self, places: &Places) {
+    fn settle(&mut self, places: &Places) {
         self.given.retain(|load| places.of(load.grain) != GONE);
         self.places.clear();
         self.places
             .extend(self.given.iter().map(|load| places.of(load.grain)));
     }
 
-    /// Lays the loads of the present positions.
-    pub fn fill(&mut self, grains: &Grains) {
+    /// Makes room for the loads of a step, of so many grains.
+    fn clear(&mut self, grains: usize) {
         self.external = Vector3::zeros();
         self.rows.clear();
-        if self.given.is_empty() {
-            return;
-        }
-        self.rows.resize(grains.len(), [[0.0; 4]; 2]);
+        self.rows.resize(grains, [[0.0; 4]; 2]);
+    }
+
+    /// Adds the steady loads.
+    fn add_given(&mut self, grains: &Grains) {
         for (&at, load) in self.places.iter().zip(&self.given) {
             let at = at as usize;
             // What holds a fixed grain takes its load as well.
@@ -75,6 +72,15 @@ impl Loads {
                 add(&mut self.rows[at], &load.force, &load.moment);
                 self.external += load.force;
             }
+        }
+    }
+
+    /// Adds what bonds do.
+    fn add_bonds(&mut self, bonds: &Bonds) {
+        for Bond { rows, pull, .. } in bonds.whole() {
+            let [i, j] = rows.map(|row| row as usize);
+            add(&mut self.rows[i], &pull.force, &pull.moments[0]);
+            add(&mut self.rows[j], &-pull.force, &pull.moments[1]);
         }
     }
 
@@ -137,6 +143,34 @@ fn add(row: &mut [[f64; 4]; 2], force: &Vector3<f64>, moment: &Vector3<f64>) {
 }
 
 impl Simulation {
+    /// Lays the loads of the present positions; bonds stretch by a step of this length (s).
+    pub(crate) fn evaluate_loads(&mut self, stretch: f64) {
+        let grains = &self.grains;
+        if !self.looks_up() {
+            self.loads.clear(0);
+            return;
+        }
+        self.loads.clear(grains.len());
+        self.loads.add_given(grains);
+        self.bonds
+            .evaluate(grains, &self.domain, stretch, self.parallel);
+        self.loads.add_bonds(&self.bonds);
+    }
+
+    /// Whether grains are looked up by number.
+    fn looks_up(&self) -> bool {
+        !self.loads.given.is_empty() || !self.bonds.is_empty()
+    }
+
+    /// Finds grains with loads and bonds again after they have been sorted.
+    pub(crate) fn settle_loads(&mut self) {
+        if self.looks_up() {
+            self.places.lay(&self.grains);
+            self.loads.settle(&self.places);
+            self.bonds.settle(&self.places);
+        }
+    }
+
     /// Puts steady loads on grains, in place of those there were; they act from now on.
     ///
     /// On a fixed grain a load does nothing. Removing a grain drops its load.

@@ -119,6 +119,7 @@ impl Simulation {
                 partner_arm: Vector3::zeros(),
             });
         }
+        self.bond_samples(&mut into.bonds);
     }
 
     /// Kinetic and elastic energy at this instant.
@@ -164,6 +165,7 @@ impl Simulation {
                 );
             }
         }
+        energy.bonds = self.bond_energy();
         energy
     }
 
@@ -324,6 +326,7 @@ impl Simulation {
         {
             c.history.iter().for_each(|h| hash.take(h.to_bits()));
         }
+        self.bonds.hash(&mut hash);
         hash.finish()
     }
 }

@@ -348,7 +348,7 @@ pub(crate) fn check_box(domain: &Domain, largest: f64, skin: f64) -> Result<(), 
     Ok(())
 }
 
-fn known_material(material: u16, materials: usize) -> Result<(), SetupError> {
+pub(crate) fn known_material(material: u16, materials: usize) -> Result<(), SetupError> {
     let material = usize::from(material);
     if material < materials {
         return Ok(());

@@ -1,5 +1,6 @@
 //! The simulation: one state, one step.
 
+use crate::bonds::Bonds;
 use crate::contact::composition::Visitor;
 use crate::contact::{ContactLaw, HISTORY_MAX, Interaction, LawTable, Step};
 use crate::contacts::Touching;
@@ -139,7 +140,7 @@ pub struct Simulation {
     pub(crate) hold: f64,
     pub(crate) planes: Vec<Plane>,
     pub(crate) timestep: f64,
-    parallel: bool,
+    pub(crate) parallel: bool,
     pub(crate) skin: f64,
     pub(crate) grains: Grains,
     /// Grains of the setup, and the number that the next grain will get.
@@ -149,6 +150,7 @@ pub struct Simulation {
     pub(crate) reach: Reach,
     pub(crate) plane_contacts: PlaneContacts,
     pub(crate) loads: Loads,
+    pub(crate) bonds: Bonds,
     /// Rows by grain number, as of the last build of lists with loads.
     pub(crate) places: Places,
     /// Histories on their way to new lists.
@@ -223,6 +225,7 @@ impl Simulation {
             reach: Reach::new(skin / SKIN),
             plane_contacts: PlaneContacts::default(),
             loads: Loads::default(),
+            bonds: Bonds::default(),
             places: Places::default(),
             touching: Touching::default(),
             fastest: Vec::new(),
@@ -288,6 +291,7 @@ impl Simulation {
             return;
         }
         self.reach.remember();
+        self.bonds.remember();
         self.before.planes.clear();
         let walls = self.plane_contacts.contacts.iter();
         self.before.planes.extend(walls.map(|c| c.history));
@@ -301,6 +305,7 @@ impl Simulation {
             return;
         }
         self.reach.recall();
+        self.bonds.recall();
         let walls = self.plane_contacts.contacts.iter_mut();
         for (contact, history) in walls.zip(&self.before.planes) {
             contact.history = *history;
@@ -343,7 +348,7 @@ impl Simulation {
                 .evaluate(law, planes, &self.grains, lever, step)
         };
         if pass != Pass::Motion {
-            self.loads.fill(&self.grains);
+            self.evaluate_loads(step.stretch);
         }
         let (g, n) = (self.gravity, self.grains.len());
         let grains = &mut self.grains;
@@ -477,7 +482,9 @@ impl Simulation {
                 overlap: FAILING_OVERLAP,
                 pressure: 0.0,
             };
-            let limits = timestep::limits_of(&classes, &self.law, &conditions, &Shares::default());
+            let shares = Shares::default();
+            let mut limits = timestep::limits_of(&classes, &self.law, &conditions, &shares);
+            limits.extend(self.bond_limit());
             timestep::choose(limits, 1.0)
         };
         let mut choice_now = choice(0.0);
@@ -528,10 +535,7 @@ impl Simulation {
             .collect(&mut self.reach, &mut self.grains, self.layout, &place);
         self.plane_contacts
             .build(&self.planes, &self.grains, &list.rows, listed, place);
-        if self.loads.looks_up() {
-            self.places.lay(&self.grains);
-            self.loads.settle(&self.places);
-        }
+        self.settle_loads();
         self.renew_rows();
         self.make_reach(true);
         self.rebuilds += 1;

@@ -1,5 +1,6 @@
 //! What an observer sees of the grains at one instant: the input of coarse-graining and of output.
 
+use crate::bonds::BondStress;
 use crate::domain::Domain;
 use nalgebra::Vector3;
 
@@ -50,6 +51,25 @@ pub struct ContactSample {
     pub partner_arm: Vector3<f64>,
 }
 
+/// A whole bond at one instant; it acts beside the contact of its grains, if they touch.
+#[derive(Clone, Copy, Debug)]
+pub struct BondSample {
+    /// Indices of its grains into [`Snapshot::grains`].
+    pub grains: [usize; 2],
+    /// Force on the first grain; the second one feels the opposite (N).
+    pub force: Vector3<f64>,
+    /// Moment on the first grain about its centre (N m).
+    pub moment: Vector3<f64>,
+    /// From the centre of the first grain to the point that divides the line of centres (m).
+    pub arm: Vector3<f64>,
+    /// From the centre of the second one, as in [`ContactSample::partner_arm`] (m).
+    pub partner_arm: Vector3<f64>,
+    /// Radius of the bond (m).
+    pub radius: f64,
+    /// Stresses at its rim.
+    pub stress: BondStress,
+}
+
 /// All grains and contacts at one instant. Reuse one value: its buffers are kept.
 #[derive(Clone, Debug)]
 pub struct Snapshot {
@@ -63,6 +83,8 @@ pub struct Snapshot {
     pub grains: Vec<GrainSample>,
     /// All touching contacts.
     pub contacts: Vec<ContactSample>,
+    /// All whole bonds, in the order in which they were made.
+    pub bonds: Vec<BondSample>,
 }
 
 impl Default for Snapshot {
@@ -77,6 +99,7 @@ impl Default for Snapshot {
             gravity: Vector3::zeros(),
             grains: Vec::new(),
             contacts: Vec::new(),
+            bonds: Vec::new(),
         }
     }
 }

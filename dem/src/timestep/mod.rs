@@ -14,6 +14,7 @@
 //! | Rayleigh time (elastic laws) | `π R √(ρ/G)/(0.1631 ν + 0.8766)` | 0.1 |
 //! | JKR time | `0.95 r^{7/6} ρ^{1/2}/(γ^{1/6} E*^{1/3})` | 0.1 |
 //! | springs and dashpots | where one contact blows up, `stability` | 0.3 |
+//! | bond | where one bond blows up, [`crate::Cement::limit`] | 0.3 |
 //! | travel | R/v of the smallest grain | 0.1 |
 //!
 //! Sources: Kappel et al. 2020 (just under 10 % of Rayleigh's and Hertz' times, checked at 3 %);
