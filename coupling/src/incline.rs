@@ -91,6 +91,7 @@ impl InclineRun {
                 gravity: Vector3::zeros(),
                 grains: Vec::new(),
                 contacts: Vec::new(),
+                bonds: Vec::new(),
             },
             averager: Averager::new(Layers, layers)?,
             simulation,

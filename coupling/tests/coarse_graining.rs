@@ -3,7 +3,9 @@
 use colluvium_coupling::coarse_graining::{
     Averager, Gauss, Heaviside, Kernel, Layering, Layers, Lucy, Profile,
 };
-use colluvium_dem::{ContactSample, Domain, GrainSample, Partner, Record, Snapshot};
+use colluvium_dem::{
+    BondSample, BondStress, ContactSample, Domain, GrainSample, Partner, Record, Snapshot,
+};
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -49,9 +51,9 @@ fn network_at_rest(seed: u64) -> Snapshot {
         })
         .collect();
     let mut net: Vec<Vector3<f64>> = grains.iter().map(|g| g.mass * gravity).collect();
-    let mut contacts = Vec::new();
+    let (mut contacts, mut bonds) = (Vec::new(), Vec::new());
     for i in 0..grains.len() {
-        for _ in 0..4 {
+        for k in 0..4 {
             let j = rng.random_range(0..grains.len());
             if j == i {
                 continue;
@@ -61,14 +63,26 @@ fn network_at_rest(seed: u64) -> Snapshot {
             let arm = 0.5 * random_vector(&mut rng);
             let mut partner_arm = 0.5 * random_vector(&mut rng);
             partner_arm.z = grains[i].position.z + arm.z - grains[j].position.z;
-            contacts.push(ContactSample {
-                grain: i,
-                partner: Partner::Grain(j),
-                overlap: 0.01,
-                force,
-                arm,
-                partner_arm,
-            });
+            if k == 3 {
+                bonds.push(BondSample {
+                    grains: [i, j],
+                    force,
+                    moment: Vector3::zeros(),
+                    arm,
+                    partner_arm,
+                    radius: 0.1,
+                    stress: BondStress::default(),
+                });
+            } else {
+                contacts.push(ContactSample {
+                    grain: i,
+                    partner: Partner::Grain(j),
+                    overlap: 0.01,
+                    force,
+                    arm,
+                    partner_arm,
+                });
+            }
             net[i] += force;
             net[j] -= force;
         }
@@ -89,6 +103,7 @@ fn network_at_rest(seed: u64) -> Snapshot {
         gravity,
         grains,
         contacts,
+        bonds,
     }
 }
 
@@ -176,6 +191,7 @@ fn stack() -> Snapshot {
         gravity: Vector3::new(0.0, 0.0, -g),
         grains,
         contacts,
+        bonds: Vec::new(),
     }
 }
 
@@ -254,6 +270,7 @@ fn sheared_gas(rng: &mut ChaCha8Rng, time: f64, shear: f64, temperature: f64) ->
         gravity: Vector3::new(0.0, 0.0, -1.0),
         grains,
         contacts: vec![],
+        bonds: Vec::new(),
     }
 }
 

@@ -156,41 +156,17 @@ impl EnergyLedger {
 
     /// The ledger of a checkpoint; none where it was not open.
     pub(crate) fn from_numbers(numbers: &[f64]) -> Result<Option<EnergyLedger>, String> {
-        let &[
-            kinetic_before,
-            kinetic,
-            gravity,
-            drive,
-            loads,
-            _,
-            _,
-            _,
-            ref rest @ ..,
-        ] = numbers
+        if numbers.is_empty() {
+            return Ok(None);
+        }
+        let (&[first, second, third, work, stored_before, stored], []) = numbers.as_chunks::<4>()
         else {
-            return match numbers {
-                [] => Ok(None),
-                _ => Err("array `energy_ledger` is too short".into()),
-            };
+            return Err("array `energy_ledger` must have 24 numbers".into());
         };
-        let wrong = || String::from("array `energy_ledger` must have 24 numbers");
-        let &[
-            bond_work,
-            before,
-            now,
-            freed_before,
-            freed,
-            _,
-            _,
-            ref rest @ ..,
-        ] = rest
-        else {
-            return Err(wrong());
-        };
-        let [work, stored_before, stored] = rest.as_chunks::<4>().0 else {
-            return Err(wrong());
-        };
-        let channels = |&[normal, tangential, rolling, twisting]: &[f64; 4]| Channels {
+        let [kinetic_before, kinetic, gravity, drive] = first;
+        let [loads, bond_work, before, now] = second;
+        let [freed_before, freed, ..] = third;
+        let channels = |[normal, tangential, rolling, twisting]: [f64; 4]| Channels {
             normal,
             tangential,
             rolling,

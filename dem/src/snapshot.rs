@@ -70,6 +70,20 @@ pub struct BondSample {
     pub stress: BondStress,
 }
 
+impl BondSample {
+    /// The bond as if it were a contact: force and arms alone, without its moments.
+    pub fn as_contact(&self) -> ContactSample {
+        ContactSample {
+            grain: self.grains[0],
+            partner: Partner::Grain(self.grains[1]),
+            overlap: 0.0,
+            force: self.force,
+            arm: self.arm,
+            partner_arm: self.partner_arm,
+        }
+    }
+}
+
 /// All grains and contacts at one instant. Reuse one value: its buffers are kept.
 #[derive(Clone, Debug)]
 pub struct Snapshot {

@@ -5,7 +5,7 @@
 //! - ρ = Σ m W, j = Σ m v W, u = j/ρ, over grains that are free; the fixed grains of a rough base are wall;
 //! - contact stress σᶜ = Σ f ⊗ a ∫₀¹ W(z − zᵢ − s a_z) ds over each free grain and each of its contacts, with
 //!   the force f on the grain and the arm a from its centre to the contact point, so each pair is split at
-//!   its contact point;
+//!   its contact point; bonds count like contacts;
 //! - wall force t = Σ f W(z − z_c) at contacts with fixed grains and planes;
 //! - kinetic stress σᵏ = −⟨ρ u′u′⟩, temperature T = tr⟨u′u′⟩/3.
 //!

@@ -1,7 +1,7 @@
 //! Sums of one instant over the grains and contacts, layer by layer.
 
 use super::{Kernel, Layering, layering::sphere_volume_below};
-use colluvium_dem::{Partner, Snapshot};
+use colluvium_dem::{BondSample, Partner, Snapshot};
 use nalgebra::Vector3;
 
 /// Where each sum starts among the per-layer arrays; array f of layer k sits at `f · count + k`.
@@ -96,7 +96,8 @@ pub(super) fn add<K: Kernel>(kernel: &K, layers: &Layering, snapshot: &Snapshot,
         tail[field::MASS_OVER_TOP] += m * (1.0 - kernel.cumulative(layers.face(n) - z));
         tail[field::MASS_UNDER_BOTTOM] += m * kernel.cumulative(layers.face(0) - z);
     }
-    for contact in &snapshot.contacts {
+    let bonds = snapshot.bonds.iter().map(BondSample::as_contact);
+    for contact in snapshot.contacts.iter().copied().chain(bonds) {
         let grain = &snapshot.grains[contact.grain];
         let (other_free, other_z) = match contact.partner {
             Partner::Grain(j) => (!snapshot.grains[j].fixed, snapshot.grains[j].position.z),
