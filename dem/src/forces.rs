@@ -1,17 +1,16 @@
-//! Forces of four pairs at a time.
+//! Forces of four or eight pairs at a time.
 //!
 //! Reads positions and velocities, writes each pair's slot and history, touches nothing else.
 
 use crate::contact::{COEFFICIENTS, HISTORY_MAX, Interaction, Lever, Step, Touch, Wrench};
 use crate::domain::Images;
-use crate::lanes::{Lanes4, Vec3};
+use crate::lanes::{Lanes, Row, Vec3};
+use crate::rows::Rows;
 
 /// What forces are made of.
 #[derive(Clone, Copy)]
 pub(crate) struct Field<'a> {
-    pub place: &'a [[f64; 4]],
-    pub motion: &'a [[f64; 4]],
-    pub turn: &'a [[f64; 4]],
+    pub rows: Rows<'a>,
     pub material: &'a [u16],
     pub images: Images,
     pub lever: Lever,
@@ -27,7 +26,7 @@ pub(crate) const fn slot_rows<I: Interaction>() -> usize {
 
 /// Coefficients of the first material, in all lanes.
 #[inline(always)]
-pub(crate) fn like_coefficients<L: Lanes4, I: Interaction>(law: &I) -> [L; COEFFICIENTS] {
+pub(crate) fn like_coefficients<L: Lanes, I: Interaction>(law: &I) -> [L; COEFFICIENTS] {
     let mut lanes = [L::splat(0.0); COEFFICIENTS];
     for (lane, &number) in lanes.iter_mut().zip(&law.table()[0]) {
         *lane = L::splat(number);
@@ -35,50 +34,67 @@ pub(crate) fn like_coefficients<L: Lanes4, I: Interaction>(law: &I) -> [L; COEFF
     lanes
 }
 
-/// Coefficients of four pairs.
+/// Coefficients of several pairs.
 #[inline(always)]
-fn mixed_coefficients<L: Lanes4, I: Interaction>(
+fn mixed_coefficients<L: Lanes, I: Interaction>(
     law: &I,
     material: &[u16],
     i: &[u32],
     j: &[u32],
 ) -> [L; COEFFICIENTS] {
-    let (table, n) = (law.table(), law.materials());
-    let mut lanes = [L::splat(0.0); COEFFICIENTS];
-    let mut pair = [0; 4];
-    for (pair, (&i, &j)) in pair.iter_mut().zip(i.iter().zip(j)) {
-        *pair = usize::from(material[i as usize]) * n + usize::from(material[j as usize]);
+    const ROWS: u32 = (COEFFICIENTS / 4) as u32;
+    let table = law.table().as_flattened().as_chunks::<4>().0;
+    let n = law.materials() as u32;
+    let mut rows = [0; WIDEST];
+    for (row, (&i, &j)) in rows.iter_mut().zip(i.iter().zip(j)) {
+        *row = u32::from(material[i as usize]) * n + u32::from(material[j as usize]);
+        *row *= ROWS;
     }
-    for block in 0..COEFFICIENTS / 4 {
-        let mut rows = [L::splat(0.0); 4];
-        for (row, &pair) in rows.iter_mut().zip(&pair) {
-            let numbers = &table[pair].as_chunks::<4>().0[block];
-            *row = L::load(numbers);
+    let mut lanes = [L::splat(0.0); COEFFICIENTS];
+    for block in lanes.chunks_exact_mut(4) {
+        block.copy_from_slice(&L::transpose(L::gather(table, &rows)));
+        for row in &mut rows {
+            *row += 1;
         }
-        let columns = L::transpose(rows);
-        lanes[4 * block..4 * block + 4].copy_from_slice(&columns);
     }
     lanes
 }
 
-/// Evaluates the law on four pairs.
-#[allow(clippy::too_many_arguments)]
+/// Most pairs in a batch.
+pub(crate) const WIDEST: usize = 8;
+
+/// Pairs evaluated together, and what they leave.
+pub(crate) struct Batch<'a> {
+    pub i: &'a [u32],
+    pub j: &'a [u32],
+    /// Which of them touch, by bits, four at a time.
+    pub lanes: &'a mut [u8],
+    pub history: &'a mut [[f64; 4]],
+    /// Of use only where a pair touches.
+    pub slots: &'a mut [[f64; 4]],
+}
+
+/// Evaluates the law on a batch.
 #[inline(always)]
-pub(crate) fn batch<L: Lanes4, I: Interaction>(
+pub(crate) fn batch<L: Lanes, I: Interaction>(
     law: &I,
     like: &[L; COEFFICIENTS],
     field: &Field,
-    i: &[u32],
-    j: &[u32],
-    history: &mut [[f64; 4]],
-    slots: &mut [[f64; 4]],
+    batch: Batch,
     deepest: &mut L,
 ) {
+    let Batch {
+        i,
+        j,
+        lanes,
+        history,
+        slots,
+    } = batch;
     let zero = L::splat(0.0);
     let one = L::splat(1.0);
     // Differences of the vectors, sums of the fourth numbers.
-    let minus = L::load(&[-1.0, -1.0, -1.0, 1.0]);
-    let [dx, dy, dz, reach] = combine(field.place, i, j, minus);
+    let minus = L::repeat(&[-1.0, -1.0, -1.0, 1.0]);
+    let [dx, dy, dz, reach] = combine(field.rows.place, i, j, minus);
     let mut d = [dx, dy, dz];
     for (k, d) in d.iter_mut().enumerate() {
         let turns = (*d * L::splat(field.images.inverse[k])).round();
@@ -92,14 +108,15 @@ pub(crate) fn batch<L: Lanes4, I: Interaction>(
         reach
     };
     let mut touching = r2.less(far * far);
-    if !L::any(touching) {
-        // Lists are short-lived: writing zeros costs less than remembering which are zero.
-        history.fill([0.0; 4]);
-        slots.fill([0.0; 4]);
+    if L::lanes(touching) == 0 {
+        if lanes.iter().any(|&touched| touched != 0) {
+            history.fill([0.0; 4]);
+            lanes.fill(0);
+        }
         return;
     }
-    let [vx, vy, vz, inverse_mass] = combine(field.motion, i, j, minus);
-    let [sx, sy, sz, curvature] = combine(field.turn, i, j, one);
+    let [vx, vy, vz, inverse_mass] = combine(field.rows.motion, i, j, minus);
+    let [sx, sy, sz, curvature] = combine(field.rows.turn, i, j, one);
     // What a scene does not have costs nothing: one material reads no table.
     let mixed;
     let coefficients = if law.materials() > 1 {
@@ -109,14 +126,18 @@ pub(crate) fn batch<L: Lanes4, I: Interaction>(
         like
     };
     let mut springs = [zero; HISTORY_MAX];
-    for (spring, row) in springs.iter_mut().zip(history.iter()) {
-        *spring = L::load(row);
+    for (k, spring) in springs[..I::HISTORY].iter_mut().enumerate() {
+        *spring = L::read(history, k, I::HISTORY);
     }
     if I::HOLDS {
         // The last number of history is 1 on an established contact, which holds across a gap.
         let held = law.hold(coefficients, curvature) * springs[I::HISTORY - 1];
         let far = reach + L::select(zero.less(held), held, zero);
         touching = r2.less(far * far);
+    }
+    let bits = L::lanes(touching);
+    for (four, lanes) in lanes.iter_mut().enumerate() {
+        *lanes = bits >> (4 * four) & 0b1111;
     }
     let distance = r2.sqrt();
     let normal = d.scale(one / distance);
@@ -129,23 +150,12 @@ pub(crate) fn batch<L: Lanes4, I: Interaction>(
     let spins = Vec3([sx, sy, sz]).scale(lever);
     let velocity = Vec3([vx, vy, vz]) - spins.cross(normal);
     let spin = if I::ROLLING {
-        let [x, y, z, _] = L::transpose([
-            spin_difference(field.turn, i[0], j[0]),
-            spin_difference(field.turn, i[1], j[1]),
-            spin_difference(field.turn, i[2], j[2]),
-            spin_difference(field.turn, i[3], j[3]),
-        ]);
-        Vec3([x, y, z])
+        spin_difference(field.rows.turn, i, j)
     } else {
         Vec3::zero()
     };
     let inverse_inertia = if I::INERTIA {
-        L::load(&[
-            inverse_inertia_sum(field, i[0], j[0]),
-            inverse_inertia_sum(field, i[1], j[1]),
-            inverse_inertia_sum(field, i[2], j[2]),
-            inverse_inertia_sum(field, i[3], j[3]),
-        ])
+        inverse_inertia_sum(field, i, j)
     } else {
         zero
     };
@@ -163,8 +173,8 @@ pub(crate) fn batch<L: Lanes4, I: Interaction>(
         tangential,
         moment,
     } = law.wrench(coefficients, &touch, &mut springs, field.step);
-    for (spring, row) in springs.iter().zip(history.iter_mut()) {
-        L::select(touching, *spring, zero).store(row);
+    for (k, spring) in springs[..I::HISTORY].iter().enumerate() {
+        L::select(touching, *spring, zero).write(history, k, I::HISTORY);
     }
     let torque = tangential.cross(normal).scale(lever);
     store_vectors(touching, force, slots, 0, slot_rows::<I>());
@@ -176,38 +186,54 @@ pub(crate) fn batch<L: Lanes4, I: Interaction>(
     *deepest = deepest.max(depth);
 }
 
-/// `1/(m_i R_i²) + 1/(m_j R_j²)`.
-#[inline(always)]
-fn inverse_inertia_sum(field: &Field, i: u32, j: u32) -> f64 {
-    let (i, j) = (i as usize, j as usize);
-    let (a, b) = (field.turn[i][3], field.turn[j][3]);
-    field.motion[i][3] * a * a + field.motion[j][3] * b * b
-}
-
 // No closures in here: they would be compiled without AVX2, and every operation in them would
 // become a call (measured: three times slower).
 
-/// Rows of `i` plus `sign` times rows of `j`, as lanes.
+/// Rows of `i` plus `sign` times rows of `j`, as columns.
 #[inline(always)]
-fn combine<L: Lanes4>(of: &[[f64; 4]], i: &[u32], j: &[u32], sign: L) -> [L; 4] {
-    L::transpose([
-        L::load(&of[i[0] as usize]) + L::load(&of[j[0] as usize]) * sign,
-        L::load(&of[i[1] as usize]) + L::load(&of[j[1] as usize]) * sign,
-        L::load(&of[i[2] as usize]) + L::load(&of[j[2] as usize]) * sign,
-        L::load(&of[i[3] as usize]) + L::load(&of[j[3] as usize]) * sign,
-    ])
+fn combine<L: Lanes>(of: &[impl Row], i: &[u32], j: &[u32], sign: L) -> [L; 4] {
+    let mut rows = L::gather(of, i);
+    for (row, other) in rows.iter_mut().zip(L::gather(of, j)) {
+        *row = *row + other * sign;
+    }
+    L::transpose(rows)
 }
 
-/// ω_i - ω_j as a row.
+/// ω_i - ω_j.
 #[inline(always)]
-fn spin_difference<L: Lanes4>(turn: &[[f64; 4]], i: u32, j: u32) -> L {
-    let (a, b) = (L::load(&turn[i as usize]), L::load(&turn[j as usize]));
-    a * a.splat_last() - b * b.splat_last()
+fn spin_difference<L: Lanes>(turn: &[impl Row], i: &[u32], j: &[u32]) -> Vec3<L> {
+    let mut rows = L::gather(turn, i);
+    for (row, other) in rows.iter_mut().zip(L::gather(turn, j)) {
+        *row = *row * row.splat_last() - other * other.splat_last();
+    }
+    let [x, y, z, _] = L::transpose(rows);
+    Vec3([x, y, z])
 }
 
-/// Writes a vector of four contacts as row `row` of their slots.
+/// `1/(m_i R_i²) + 1/(m_j R_j²)`.
 #[inline(always)]
-fn store_vectors<L: Lanes4>(
+fn inverse_inertia_sum<L: Lanes>(field: &Field, i: &[u32], j: &[u32]) -> L {
+    let mut rows = inverse_inertias::<L>(field, i);
+    for (row, other) in rows.iter_mut().zip(inverse_inertias::<L>(field, j)) {
+        *row = *row + other;
+    }
+    let [_, _, _, sum] = L::transpose(rows);
+    sum
+}
+
+/// Rows whose last number is 1/(m R²).
+#[inline(always)]
+fn inverse_inertias<L: Lanes>(field: &Field, at: &[u32]) -> [L; 4] {
+    let mut rows = L::gather(field.rows.motion, at);
+    for (row, turn) in rows.iter_mut().zip(L::gather(field.rows.turn, at)) {
+        *row = *row * turn * turn;
+    }
+    rows
+}
+
+/// Writes a vector as row `row` of the slots of touching pairs.
+#[inline(always)]
+fn store_vectors<L: Lanes>(
     mask: L::Mask,
     v: Vec3<L>,
     slots: &mut [[f64; 4]],
@@ -217,7 +243,5 @@ fn store_vectors<L: Lanes4>(
     let zero = L::splat(0.0);
     let v = Vec3::select(mask, v, Vec3::zero());
     let out = L::transpose([v.0[0], v.0[1], v.0[2], zero]);
-    for (k, contact) in out.into_iter().enumerate() {
-        contact.store(&mut slots[k * rows + row]);
-    }
+    L::scatter(out, slots, row, rows);
 }

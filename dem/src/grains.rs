@@ -66,8 +66,7 @@ pub(crate) struct Grains {
     pub next: Next,
 }
 
-/// Where a step or a sort writes: steps read old rows and write new ones, so that threads share the
-/// old ones freely.
+/// Where a sort writes; room for others between steps.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Next {
     pub place: Vec<[f64; 4]>,
@@ -195,13 +194,6 @@ impl Grains {
         for (((mass, id), material), room) in ordered.zip(&self.next.place) {
             (*mass, *id, *material) = (room[0], room[1] as u32, room[2] as u16);
         }
-    }
-
-    /// Makes the rows that a step has written the present ones.
-    pub fn turn_over(&mut self) {
-        std::mem::swap(&mut self.place, &mut self.next.place);
-        std::mem::swap(&mut self.motion, &mut self.next.motion);
-        std::mem::swap(&mut self.turn, &mut self.next.turn);
     }
 }
 

@@ -264,7 +264,7 @@ impl Simulation {
         let mut turn = vector(s);
         let fixed = self.grains.is_fixed(i);
         if !fixed {
-            let [force, torque, moment] = self.gather(i);
+            let [force, torque, moment] = self.totals[i];
             velocity += 0.5 * kick * (vector(&force) * v[3] + self.gravity);
             turn += 0.5 * kick / SPHERE_INERTIA * v[3] * (vector(&torque) + vector(&moment) * s[3]);
         }

@@ -10,6 +10,7 @@
 
 mod bonds;
 mod checkpoint;
+mod chunk;
 pub mod contact;
 mod contacts;
 mod domain;
@@ -19,7 +20,7 @@ mod grains;
 mod grid;
 mod lanes;
 mod ledger;
-mod loads;
+mod links;
 mod motion;
 mod neighbours;
 mod observe;
@@ -30,6 +31,7 @@ pub mod preparation;
 mod reach;
 mod record;
 mod region;
+mod rows;
 mod setup;
 mod simulation;
 mod snapshot;

@@ -7,101 +7,46 @@
 //! Leap-frog. The moment of the tangential force is stored as `n × F_t`-type vectors T without the
 //! radius, which cancels: `d(Rω)/dt = 5/(2m) (T + M/R)`.
 //!
-//! Order of a grain's sum: its pairs as `i` in list order, then its pairs as `j` from the last to the
-//! first, then planes, then loads. Pairs of earlier chunks thus come last among pairs, whatever the cuts.
+//! Order of a grain's sum: its pairs in the order of the Verlet list, which are those as `j` by rising
+//! `i` and then those as `i`, then planes.
 
+use crate::chunk::Chunk;
 use crate::grains::SPHERE_INERTIA;
 use crate::lanes::{Lanes4, Portable};
 use crate::loads::Loads;
 use crate::planes::PlaneContacts;
-use crate::reach::{Chunk, Reach, SHARES, Shared};
-
-/// Where the slots of the pairs evaluated last are found: pair k at k modulo the ring's length.
-#[derive(Clone, Copy)]
-pub(crate) struct Ring {
-    base: usize,
-    len: usize,
-}
-
-impl Ring {
-    /// Slots of all pairs are there: no place is used twice.
-    pub const ALL: usize = usize::MAX;
-
-    /// The ring when all pairs before `end` have been evaluated.
-    #[inline(always)]
-    pub fn at(end: usize, len: usize) -> Self {
-        let oldest = end.saturating_sub(len);
-        Ring {
-            base: oldest - oldest % len,
-            len,
-        }
-    }
-
-    /// Place of the slot of one of the last `len` pairs.
-    #[inline(always)]
-    pub fn place(self, pair: usize) -> usize {
-        let place = pair - self.base;
-        if place < self.len {
-            place
-        } else {
-            place - self.len
-        }
-    }
-}
+use crate::reach::Reach;
 
 /// Force, moment of the tangential force, further moment on a grain.
 #[derive(Clone, Copy)]
 pub(crate) struct Sum<L>(pub [L; 3]);
 
-/// Sums over a chunk's own pairs for the grains from `from` to `to` (of the chunk).
-///
-/// One loop over the terms of all grains without a branch in it: loops over the few terms of each
-/// grain end unpredictably, which costs more than the sums.
-#[inline(always)]
-pub(crate) fn sums<L: Lanes4, const ROWS: usize>(
-    chunk: &Chunk,
-    [from, to]: [usize; 2],
-    ring: Ring,
-    sums: &mut [[[f64; 4]; ROWS]],
-) {
-    let zero = L::splat(0.0);
-    let mut sum = [zero; ROWS];
-    let slots = chunk.slots.as_chunks::<ROWS>().0;
-    let terms = chunk.first_term[from] as usize..chunk.first_term[to] as usize;
-    let mut next = 0;
-    for &term in &chunk.terms[terms] {
-        let slot = &slots[ring.place(term.pair())];
-        let [force, torque] = SHARES[term.share()];
-        next += term.first();
-        let fresh = zero.less(L::splat([0.0, 1.0][term.first()]));
-        let out = &mut sums[next - 1];
-        for row in 0..ROWS {
-            let share = L::splat(if row == 1 { torque } else { force });
-            sum[row] = L::select(fresh, zero, sum[row]) + L::load(&slot[row]) * share;
-            sum[row].store(&mut out[row]);
-        }
-    }
-}
-
 impl<L: Lanes4> Sum<L> {
-    /// Adds the pairs of earlier chunks to shared grain `s` of a chunk.
+    /// Sum over all pairs of shared grain `s` of a chunk.
     #[inline(always)]
-    pub fn import(&mut self, chunks: &[Chunk], chunk: &Chunk, s: usize, rows: usize) {
+    pub fn import(chunks: &[Chunk], chunk: &Chunk, s: usize, rows: usize) -> Self {
         let end = match chunk.shared.get(s + 1) {
             Some(next) => next.first_import as usize,
             None => chunk.imports.len(),
         };
+        let mut sum = Sum([L::splat(0.0); 3]);
         for import in &chunk.imports[chunk.shared[s].first_import as usize..end] {
             let exports = &chunks[import.chunk as usize].exports;
-            self.subtract(&exports[import.export as usize * rows..][..rows]);
+            let slot = Sum::load(&exports[import.export as usize * rows..][..rows]);
+            if import.other {
+                sum.subtract(&slot);
+            } else {
+                sum.add(&slot);
+            }
         }
+        sum
     }
 
     /// Adds the planes.
     #[inline(always)]
     pub fn lean(&mut self, planes: &PlaneContacts, grain: usize) {
         for contact in planes.of(grain) {
-            self.add(&contact.slot);
+            self.add(&Sum::load(&contact.slot));
         }
     }
 
@@ -115,23 +60,19 @@ impl<L: Lanes4> Sum<L> {
     }
 
     #[inline(always)]
-    fn add(&mut self, slot: &[[f64; 4]]) {
-        self.0[0] = self.0[0] + L::load(&slot[0]);
-        self.0[1] = self.0[1] + L::load(&slot[1]);
-        if slot.len() == 3 {
-            self.0[2] = self.0[2] + L::load(&slot[2]);
+    pub fn add(&mut self, slot: &Self) {
+        for (sum, slot) in self.0.iter_mut().zip(&slot.0) {
+            *sum = *sum + *slot;
         }
     }
 
     /// The other side of a pair: force and further moment are opposite, the moment of the
     /// tangential force is the same.
     #[inline(always)]
-    fn subtract(&mut self, slot: &[[f64; 4]]) {
-        self.0[0] = self.0[0] - L::load(&slot[0]);
-        self.0[1] = self.0[1] + L::load(&slot[1]);
-        if slot.len() == 3 {
-            self.0[2] = self.0[2] - L::load(&slot[2]);
-        }
+    pub fn subtract(&mut self, slot: &Self) {
+        self.0[0] = self.0[0] - slot.0[0];
+        self.0[1] = self.0[1] + slot.0[1];
+        self.0[2] = self.0[2] - slot.0[2];
     }
 
     /// A sum from its rows; without a third one there is no further moment.
@@ -142,6 +83,14 @@ impl<L: Lanes4> Sum<L> {
             sum.0[2] = L::load(&rows[2]);
         }
         sum
+    }
+
+    /// Writes the rows there are.
+    #[inline(always)]
+    pub fn store(self, rows: &mut [[f64; 4]]) {
+        for (sum, row) in self.0.into_iter().zip(rows) {
+            sum.store(row);
+        }
     }
 }
 
@@ -175,37 +124,41 @@ impl<L: Lanes4> Body<L> {
         let turned = kick * spin_up * inverse_mass * (torque + moment * turn.splat_last());
         Body([place + drift * moved, moved, turn + turned])
     }
+
+    /// One of the rows.
+    #[inline(always)]
+    pub fn row(&self, k: usize) -> [f64; 4] {
+        let mut row = [0.0; 4];
+        self.0[k].store(&mut row);
+        row
+    }
 }
 
-/// Force and both moments on a grain at this instant, gathered in the order of a step.
-pub(crate) fn gather(
+/// Force and both moments on every grain at this instant, added in the order of a step, from the slots
+/// of all pairs.
+pub(crate) fn total(
     reach: &Reach,
     planes: &PlaneContacts,
     loads: &Loads,
     rows: usize,
-    g: usize,
-) -> [[f64; 4]; 3] {
-    let chunk = reach.chunk_of(g);
-    let own = g - chunk.grains.start;
-    let (own, ring) = ([own, own + 1], Ring::at(0, Ring::ALL));
-    let mut sum = if rows == 2 {
-        let mut two = [[[0.0; 4]; 2]];
-        sums::<Portable, 2>(chunk, own, ring, &mut two);
-        Sum::<Portable>::load(&two[0])
-    } else {
-        let mut three = [[[0.0; 4]; 3]];
-        sums::<Portable, 3>(chunk, own, ring, &mut three);
-        Sum::load(&three[0])
+    totals: &mut [[[f64; 4]; 3]],
+) {
+    totals.fill([[0.0; 4]; 3]);
+    let change = |total: &mut [[f64; 4]; 3], add: &dyn Fn(&mut Sum<Portable>)| {
+        let mut sum = Sum::<Portable>::load(total);
+        add(&mut sum);
+        sum.store(total);
     };
-    let shared = |s: &Shared| s.grain as usize;
-    if let Ok(s) = chunk.shared.binary_search_by_key(&g, shared) {
-        sum.import(&reach.chunks, chunk, s, rows);
+    for (chunk, place) in reach.pairs() {
+        if chunk.touches(place) == 1 {
+            let slot = Sum::load(&chunk.slots[place * rows..][..rows]);
+            change(&mut totals[chunk.i[place] as usize], &|sum| sum.add(&slot));
+            change(&mut totals[chunk.j[place] as usize], &|sum| {
+                sum.subtract(&slot);
+            });
+        }
     }
-    sum.lean(planes, g);
-    sum.bear(loads, g);
-    let mut out = [[0.0; 4]; 3];
-    for (out, sum) in out.iter_mut().zip(sum.0) {
-        sum.store(out);
+    for (g, total) in totals.iter_mut().enumerate() {
+        change(total, &|sum| sum.lean(planes, g));
     }
-    out
 }

@@ -1,11 +1,10 @@
 //! Looking at a simulation: snapshots, energies, sums, hash.
 
+use crate::chunk::Chunk;
 use crate::contact::composition::Visitor;
 use crate::contact::{HISTORY_MAX, Interaction, Stored};
 use crate::energy::Energy;
 use crate::grains::{SPHERE_INERTIA, vector};
-use crate::motion;
-use crate::reach::Chunk;
 use crate::simulation::Simulation;
 use crate::snapshot::{ContactSample, GrainSample, Partner, Snapshot};
 use crate::state_hash::StateHash;
@@ -41,7 +40,7 @@ impl Simulation {
         let mut velocity = vector(v);
         let mut turn = vector(s);
         if self.steps_since_start > 0 && inverse_mass > 0.0 {
-            let [force, torque, moment] = self.gather(i);
+            let [force, torque, moment] = self.totals[i];
             let half = 0.5 * self.timestep;
             velocity += half * (vector(&force) * inverse_mass + self.gravity);
             turn += half / SPHERE_INERTIA
@@ -171,12 +170,8 @@ impl Simulation {
 
     /// History of a pair within reach.
     fn history_of(&self, chunk: &Chunk, pair: usize) -> [f64; HISTORY_MAX] {
-        let width = self.layout.history;
         let mut history = [0.0; HISTORY_MAX];
-        let block = &chunk.history[pair / 4 * width..][..width];
-        for (h, row) in history.iter_mut().zip(block) {
-            *h = row[pair % 4];
-        }
+        chunk.history(pair, &mut history[..self.layout.history]);
         history
     }
 

@@ -100,7 +100,7 @@ impl Simulation {
             if inverse_mass == 0.0 {
                 continue;
             }
-            let [force, torque, moment] = self.gather(i).map(|sum| vector(&sum));
+            let [force, torque, moment] = self.totals[i].map(|sum| vector(&sum));
             let inverse_radius = self.grains.turn[i][3];
             let back = half * (force * inverse_mass + self.gravity);
             let turn = half / SPHERE_INERTIA * inverse_mass * (torque + moment * inverse_radius);

@@ -7,14 +7,15 @@ use crate::contacts::Touching;
 use crate::domain::{Domain, Images};
 use crate::forces::{self, Field};
 use crate::grains::{Grains, vector};
+use crate::lanes::Width;
 use crate::ledger::EnergyLedger;
-use crate::loads::Loads;
-use crate::motion::Motion;
+use crate::motion::{self, Motion};
 use crate::neighbours::Neighbours;
 use crate::places::Places;
 use crate::planes::{Plane, PlaneContacts};
 use crate::population::GONE;
 use crate::reach::{Making, Reach};
+use crate::rows::Rows;
 use crate::setup::{Setup, SetupError, Threads};
 use crate::snapshot::GrainSample;
 use crate::sweep::{self, Moved, Pass, Sweep};
@@ -141,6 +142,8 @@ pub struct Simulation {
     pub(crate) planes: Vec<Plane>,
     pub(crate) timestep: f64,
     pub(crate) parallel: bool,
+    /// Registers that steps use; all give the same bits.
+    pub(crate) width: Width,
     pub(crate) skin: f64,
     pub(crate) grains: Grains,
     /// Grains of the setup, and the number that the next grain will get.
@@ -167,8 +170,10 @@ pub struct Simulation {
     pub(crate) account: Vector3<f64>,
     /// Mass of the free grains (kg).
     weighed: f64,
-    /// Whether slots hold the forces of the present positions.
+    /// Whether slots and totals hold the forces of the present positions.
     current: bool,
+    /// Sums of all grains, for observers.
+    pub(crate) totals: Vec<[[f64; 4]; 3]>,
     /// Whether springs are already stretched to the present positions.
     pub(crate) springs_current: bool,
     /// Springs before the forces of the present positions were looked at out of turn.
@@ -217,6 +222,7 @@ impl Simulation {
             planes: setup.planes,
             timestep: setup.timestep,
             parallel: setup.threads == Threads::Rayon,
+            width: Width::widest(),
             skin,
             grains: Grains::new(&setup.grains),
             setup_grains: setup.grains.len(),
@@ -235,6 +241,7 @@ impl Simulation {
             account: Vector3::zeros(),
             weighed: 0.0,
             current: false,
+            totals: Vec::new(),
             springs_current: false,
             before: Springs::default(),
             steps: 0,
@@ -314,10 +321,13 @@ impl Simulation {
         self.current = false;
     }
 
-    /// Forces of the present positions into the slots of all pairs.
+    /// Forces of the present positions into the slots of all pairs and the totals of all grains.
     fn evaluate_forces(&mut self) {
         if !self.current {
             self.pass(Pass::Forces, 0.0);
+            self.totals.resize(self.grains.len(), [[0.0; 4]; 3]);
+            let (walls, rows) = (&self.plane_contacts, self.slot_rows());
+            motion::total(&self.reach, walls, rows, &mut self.totals);
             self.current = true;
         }
     }
@@ -350,15 +360,16 @@ impl Simulation {
         if pass != Pass::Motion {
             self.evaluate_loads(step.stretch);
         }
-        let (g, n) = (self.gravity, self.grains.len());
-        let grains = &mut self.grains;
+        let (g, grains) = (self.gravity, &mut self.grains);
+        // SAFETY: a sweep writes the rows of each chunk on one thread, those of grains that other
+        // chunks read after all of them are through (`sweep.rs`).
+        let rows = unsafe { Rows::of(&mut grains.place, &mut grains.motion, &mut grains.turn) };
         let sweep = Sweep {
             pass,
+            width: self.width,
             parallel: self.parallel && self.reach.parallel,
             field: Field {
-                place: &grains.place,
-                motion: &grains.motion,
-                turn: &grains.turn,
+                rows,
                 material: &grains.material,
                 images: Images::of(&self.domain),
                 lever,
@@ -366,7 +377,7 @@ impl Simulation {
                 step,
             },
             planes: &self.plane_contacts,
-            loads: &self.loads,
+            totals: &self.totals,
             rows: &self.list.rows,
             motion: Motion {
                 gravity: [g.x, g.y, g.z, 0.0],
@@ -376,17 +387,11 @@ impl Simulation {
             fixed: &self.fixed,
         };
         let moved = Moved {
-            first: [0; 3],
-            place: &mut grains.next.place[..n],
-            motion: &mut grains.next.motion[..n],
-            turn: &mut grains.next.turn[..n],
+            first: [0; 2],
             fastest: &mut self.fastest,
             taken: &mut self.taken,
         };
         let pairs = sweep::run(law, &sweep, &mut self.reach.chunks, moved);
-        if pass != Pass::Forces {
-            grains.turn_over();
-        }
         pairs.max(walls)
     }
 

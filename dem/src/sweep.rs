@@ -1,23 +1,23 @@
 //! A step: forces and motion in one sweep over the grains.
 //!
-//! Pairs are ordered by their lower grain i. Once all pairs with i ≤ g are evaluated, grain g has all
-//! its forces and no later pair reads its position: it is moved at once, while its rows and slots are
-//! in the cache. A slot is needed from then until the partner j is moved, so slots live in a ring.
+//! Pairs are ordered by their lower grain i. A block of grains at a time, all pairs with i in the block
+//! are evaluated into *slots*, those that touch are added to the sums of both grains in their order,
+//! and the block's grains, which then have all their forces, are moved while their rows are in the
+//! cache. Slots live for a block; sums from the first pair of a grain until it is moved, in a ring.
 //!
 //! **Threads.** Each chunk is swept on its own. A grain that is partner in a pair of an earlier chunk
-//! is *shared*: the sweep leaves the sum over its own chunk's pairs, and it is moved after all chunks
-//! are through, from copies of the slots it lacks. Chunks read the old rows of all grains and write
-//! the new rows of their own, so no two threads meet, and the order of every sum is the same for any
-//! cuts.
+//! is *shared* (`links.rs`): it is moved after all chunks are through, from copies of its slots. So
+//! rows are moved in place, although chunks read rows of later ones: only those of shared grains. The
+//! order of every sum is the same for any cuts.
 
+use crate::chunk::{BLOCK, Chunk, End};
 use crate::contact::Interaction;
-use crate::forces::{Field, batch, like_coefficients, slot_rows};
-use crate::lanes::{Lanes4, Portable, has_avx2};
-use crate::loads::Loads;
-use crate::motion::{Body, Motion, Ring, Sum, sums};
+use crate::forces::{Batch, Field, batch, like_coefficients, slot_rows};
+use crate::lanes::{Lanes, Lanes4, Portable, Width};
+use crate::motion::{Body, Motion, Sum};
 use crate::neighbours::Row;
 use crate::planes::PlaneContacts;
-use crate::reach::{BLOCK, Chunk};
+use crate::rows::Rows;
 
 /// What a sweep does.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -26,7 +26,7 @@ pub(crate) enum Pass {
     Step,
     /// Forces alone, with the slots of all pairs, for observers.
     Forces,
-    /// Motion from the slots of all pairs.
+    /// Motion from the sums of all grains.
     Motion,
 }
 
@@ -34,24 +34,23 @@ pub(crate) enum Pass {
 #[derive(Clone, Copy)]
 pub(crate) struct Sweep<'a> {
     pub pass: Pass,
+    pub width: Width,
     /// Whether chunks are shared out over threads.
     pub parallel: bool,
     pub field: Field<'a>,
     pub planes: &'a PlaneContacts,
-    pub loads: &'a Loads,
+    /// Sums of all grains, planes included, for [`Pass::Motion`].
+    pub totals: &'a [[[f64; 4]; 3]],
     pub rows: &'a [Row],
     pub motion: Motion,
     /// Fixed grains, in order.
     pub fixed: &'a [u32],
 }
 
-/// What a sweep writes for consecutive rows of grains.
+/// What a sweep leaves for consecutive rows of grains.
 pub(crate) struct Moved<'a> {
-    /// Number of the first grain, row and fixed grain.
-    pub first: [usize; 3],
-    pub place: &'a mut [[f64; 4]],
-    pub motion: &'a mut [[f64; 4]],
-    pub turn: &'a mut [[f64; 4]],
+    /// Number of the first row and fixed grain.
+    pub first: [usize; 2],
     /// Square of the largest speed against the row's drift (m²/s²).
     pub fastest: &'a mut [f64],
     /// Momentum that each fixed grain has taken from free ones (N s).
@@ -63,25 +62,16 @@ impl Moved<'_> {
     fn cut(self, chunk: &Chunk, fixed: &[u32]) -> (Self, Self) {
         let (grain, row) = (chunk.grains.start, chunk.rows.start);
         let held = fixed.partition_point(|&f| (f as usize) < grain);
-        let [g, r, f] = self.first;
-        let (place, place_b) = self.place.split_at_mut(grain - g);
-        let (motion, motion_b) = self.motion.split_at_mut(grain - g);
-        let (turn, turn_b) = self.turn.split_at_mut(grain - g);
+        let [r, f] = self.first;
         let (fastest, fastest_b) = self.fastest.split_at_mut(row - r);
         let (taken, taken_b) = self.taken.split_at_mut(held - f);
         let front = Moved {
             first: self.first,
-            place,
-            motion,
-            turn,
             fastest,
             taken,
         };
         let back = Moved {
-            first: [grain, row, held],
-            place: place_b,
-            motion: motion_b,
-            turn: turn_b,
+            first: [row, held],
             fastest: fastest_b,
             taken: taken_b,
         };
@@ -91,9 +81,6 @@ impl Moved<'_> {
     fn reborrow(&mut self) -> Moved<'_> {
         Moved {
             first: self.first,
-            place: self.place,
-            motion: self.motion,
-            turn: self.turn,
             fastest: self.fastest,
             taken: self.taken,
         }
@@ -107,52 +94,34 @@ pub(crate) fn run<I: Interaction>(
     chunks: &mut [Chunk],
     mut moved: Moved,
 ) -> f64 {
-    let wide = has_avx2();
     let rows = slot_rows::<I>();
     for chunk in chunks.iter_mut() {
-        let kept = match sweep.pass {
-            Pass::Step => chunk.ring,
-            Pass::Forces | Pass::Motion => chunk.i.len(),
-        };
-        // A term without weight may point at the first slot.
-        let needed = kept.max(1) * rows;
-        if chunk.slots.len() < needed {
-            chunk.slots.resize(needed, [0.0; 4]);
-        }
-        chunk.exports.resize(chunk.exported.len() * rows, [0.0; 4]);
+        chunk.make_room(sweep.pass, rows);
     }
-    let deepest = first(law, sweep, chunks, moved.reborrow(), wide);
-    if sweep.pass != Pass::Forces && chunks.len() > 1 {
-        second::<I>(sweep, chunks, chunks, moved, wide);
+    let deepest = first(law, sweep, chunks, moved.reborrow());
+    if sweep.pass == Pass::Step && chunks.len() > 1 {
+        second::<I>(sweep, chunks, chunks, moved);
     }
     deepest
 }
 
 /// Sweeps each chunk.
-fn first<I: Interaction>(
-    law: &I,
-    sweep: &Sweep,
-    chunks: &mut [Chunk],
-    moved: Moved,
-    wide: bool,
-) -> f64 {
+fn first<I: Interaction>(law: &I, sweep: &Sweep, chunks: &mut [Chunk], moved: Moved) -> f64 {
     if let [chunk] = chunks {
-        #[cfg(target_arch = "x86_64")]
-        if wide {
-            // SAFETY: `wide` is only set when the processor has AVX2.
-            return unsafe { chunk_avx2(law, sweep, chunk, moved) };
-        }
-        let _ = wide;
-        return if I::ROLLING {
-            chunk_in::<Portable, I, 3>(law, sweep, chunk, moved)
-        } else {
-            chunk_in::<Portable, I, 2>(law, sweep, chunk, moved)
+        return match sweep.width {
+            Width::Portable => chunk_rows::<Portable, I>(law, sweep, chunk, moved),
+            // SAFETY: the width is one that the processor has.
+            #[cfg(target_arch = "x86_64")]
+            Width::Avx2 => unsafe { chunk_avx2(law, sweep, chunk, moved) },
+            // SAFETY: the width is one that the processor has.
+            #[cfg(target_arch = "x86_64")]
+            Width::Avx512 => unsafe { chunk_avx512(law, sweep, chunk, moved) },
         };
     }
     let (front, back) = chunks.split_at_mut(chunks.len() / 2);
     let (moved_front, moved_back) = moved.cut(&back[0], sweep.fixed);
-    let front = || first(law, sweep, front, moved_front, wide);
-    let back = || first(law, sweep, back, moved_back, wide);
+    let front = || first(law, sweep, front, moved_front);
+    let back = || first(law, sweep, back, moved_back);
     let (a, b) = if sweep.parallel {
         rayon::join(front, back)
     } else {
@@ -162,27 +131,19 @@ fn first<I: Interaction>(
 }
 
 /// Moves the shared grains of each chunk.
-fn second<I: Interaction>(
-    sweep: &Sweep,
-    all: &[Chunk],
-    chunks: &[Chunk],
-    moved: Moved,
-    wide: bool,
-) {
+fn second<I: Interaction>(sweep: &Sweep, all: &[Chunk], chunks: &[Chunk], moved: Moved) {
     if let [chunk] = chunks {
-        #[cfg(target_arch = "x86_64")]
-        if wide {
-            // SAFETY: `wide` is only set when the processor has AVX2.
-            unsafe { shared_avx2::<I>(sweep, all, chunk, moved) };
-            return;
-        }
-        let _ = wide;
-        return shared_in::<Portable, I>(sweep, all, chunk, moved);
+        return match sweep.width {
+            Width::Portable => shared_in::<Portable, I>(sweep, all, chunk, moved),
+            // SAFETY: the width is one that the processor has; the widest ones include AVX2.
+            #[cfg(target_arch = "x86_64")]
+            Width::Avx2 | Width::Avx512 => unsafe { shared_avx2::<I>(sweep, all, chunk, moved) },
+        };
     }
     let (front, back) = chunks.split_at(chunks.len() / 2);
     let (moved_front, moved_back) = moved.cut(&back[0], sweep.fixed);
-    let front = || second::<I>(sweep, all, front, moved_front, wide);
-    let back = || second::<I>(sweep, all, back, moved_back, wide);
+    let front = || second::<I>(sweep, all, front, moved_front);
+    let back = || second::<I>(sweep, all, back, moved_back);
     if sweep.parallel {
         rayon::join(front, back);
     } else {
@@ -203,11 +164,22 @@ unsafe fn chunk_avx2<I: Interaction>(
     chunk: &mut Chunk,
     moved: Moved,
 ) -> f64 {
-    if I::ROLLING {
-        chunk_in::<crate::lanes::avx2::Avx2, I, 3>(law, sweep, chunk, moved)
-    } else {
-        chunk_in::<crate::lanes::avx2::Avx2, I, 2>(law, sweep, chunk, moved)
-    }
+    chunk_rows::<crate::lanes::avx2::Avx2, I>(law, sweep, chunk, moved)
+}
+
+/// The sweep compiled for AVX-512.
+///
+/// # Safety
+/// The processor must have AVX-512 (F, DQ, VL).
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,avx512f,avx512dq,avx512vl")]
+unsafe fn chunk_avx512<I: Interaction>(
+    law: &I,
+    sweep: &Sweep,
+    chunk: &mut Chunk,
+    moved: Moved,
+) -> f64 {
+    chunk_rows::<crate::lanes::avx512::Avx512, I>(law, sweep, chunk, moved)
 }
 
 /// Moving the shared grains, compiled for AVX2.
@@ -221,72 +193,175 @@ unsafe fn shared_avx2<I: Interaction>(sweep: &Sweep, all: &[Chunk], chunk: &Chun
 }
 
 #[inline(always)]
-fn chunk_in<L: Lanes4, I: Interaction, const ROWS: usize>(
+fn chunk_rows<L: Lanes, I: Interaction>(
+    law: &I,
+    sweep: &Sweep,
+    chunk: &mut Chunk,
+    moved: Moved,
+) -> f64 {
+    if I::ROLLING {
+        chunk_in::<L, I, 3>(law, sweep, chunk, moved)
+    } else {
+        chunk_in::<L, I, 2>(law, sweep, chunk, moved)
+    }
+}
+
+#[inline(always)]
+fn chunk_in<L: Lanes, I: Interaction, const ROWS: usize>(
     law: &I,
     sweep: &Sweep,
     chunk: &mut Chunk,
     mut moved: Moved,
 ) -> f64 {
-    let rows = ROWS;
-    let ring = if sweep.pass == Pass::Step {
-        chunk.ring
-    } else {
-        Ring::ALL
-    };
-    let n = chunk.grains.len();
-    let mut block = [[[0.0; 4]; ROWS]; BLOCK];
     let mut deepest = L::splat(0.0);
     let like = like_coefficients::<L, I>(law);
-    let (mut evaluated, mut at, mut exported) = (0, 0, 0);
     let mut cursor = Cursor::default();
-    let mut shared = 0;
     moved.fastest.fill(0.0);
-    let mut from = 0;
-    while from < n {
-        let to = (from + BLOCK).min(n);
-        if sweep.pass != Pass::Motion {
-            let end = chunk.pairs_before[from / BLOCK] as usize;
-            while evaluated < end {
-                let k = evaluated;
-                let (i, j) = (&chunk.i[k..k + 4], &chunk.j[k..k + 4]);
-                let history = &mut chunk.history[k / 4 * I::HISTORY..][..I::HISTORY];
-                let slots = &mut chunk.slots[at * rows..][..4 * rows];
-                let field = &sweep.field;
-                batch::<L, I>(law, &like, field, i, j, history, slots, &mut deepest);
-                evaluated += 4;
-                at += 4;
-                if at == ring {
-                    at = 0;
-                }
-            }
-            let ring = Ring::at(evaluated, ring);
-            while exported < chunk.exported.len() && (chunk.exported[exported] as usize) < end {
-                let at = ring.place(chunk.exported[exported] as usize) * rows;
-                chunk.exports[exported * rows..][..rows]
-                    .copy_from_slice(&chunk.slots[at..at + rows]);
-                exported += 1;
-            }
+    if sweep.pass == Pass::Motion {
+        for g in chunk.grains.clone() {
+            let sum = Sum::<L::Row>::load(&sweep.totals[g]);
+            move_grain(sweep, g, &sum, &mut moved, &mut cursor);
         }
-        if sweep.pass != Pass::Forces {
-            let ring = Ring::at(evaluated, ring);
-            sums::<L, ROWS>(chunk, [from, to], ring, &mut block);
-            for (g, sum) in (chunk.grains.start + from..chunk.grains.start + to).zip(&block) {
+        return 0.0;
+    }
+    let mut from = End::default();
+    let (mut exported, mut shared) = (0, 0);
+    for block in 0..chunk.ends.len() {
+        let end = chunk.ends[block];
+        let first = if sweep.pass == Pass::Step {
+            from.places as usize
+        } else {
+            0
+        };
+        if let Some(next) = chunk.ends.get(block + 1) {
+            let ahead = end.reached as usize..next.reached as usize;
+            sweep.field.rows.fetch(ahead);
+        }
+        for place in (from.places as usize..end.places as usize).step_by(L::WIDTH) {
+            let fours = L::WIDTH / 4;
+            let pairs = Batch {
+                i: &chunk.i[place..place + L::WIDTH],
+                j: &chunk.j[place..place + L::WIDTH],
+                lanes: &mut chunk.lanes[place / 4..][..fours],
+                history: &mut chunk.history[place / 4 * I::HISTORY..][..fours * I::HISTORY],
+                slots: &mut chunk.slots[(place - first) * ROWS..][..L::WIDTH * ROWS],
+            };
+            batch::<L, I>(law, &like, &sweep.field, pairs, &mut deepest);
+        }
+        if sweep.pass == Pass::Step {
+            exported = chunk.export_slots(exported, first, end, ROWS);
+            chunk.sum_block::<L::Row, ROWS>(first, from, end);
+            let grains = chunk.grains.start + block * BLOCK..chunk.grains.end;
+            for g in grains.take(BLOCK) {
+                let mut sum = chunk.take_sum::<L::Row, ROWS>(g);
                 if shared < chunk.shared.len() && chunk.shared[shared].grain as usize == g {
-                    chunk.partial[shared][..ROWS].copy_from_slice(sum);
                     shared += 1;
                     continue;
                 }
-                let mut sum = Sum::<L>::load(sum);
                 sum.lean(sweep.planes, g);
                 sum.bear(sweep.loads, g);
                 move_grain(sweep, g, &sum, &mut moved, &mut cursor);
             }
         }
-        from = to;
+        from = end;
     }
-    let mut out = [0.0; 4];
-    deepest.store(&mut out);
-    out.iter().fold(0.0, |a: f64, &b| a.max(b))
+    chunk.clear_beyond(ROWS);
+    deepest.largest()
+}
+
+impl Chunk {
+    /// Makes room for what a pass leaves; slots of all pairs begin as zeros.
+    fn make_room(&mut self, pass: Pass, rows: usize) {
+        match pass {
+            Pass::Step => {
+                let slots = self.widest * rows;
+                if self.slots.len() < slots {
+                    self.slots.resize(slots, [0.0; 4]);
+                }
+                let sums = (self.ring + 1) * rows;
+                if self.sums.len() < sums {
+                    self.sums.resize(sums, [0.0; 4]);
+                }
+                if self.found.len() < self.widest {
+                    self.found.resize(self.widest, 0);
+                }
+                self.exports.resize(self.exported.len() * rows, [0.0; 4]);
+            }
+            Pass::Forces => {
+                self.slots.clear();
+                self.slots.resize(self.i.len() * rows, [0.0; 4]);
+            }
+            Pass::Motion => {}
+        }
+    }
+
+    /// Copies the slots of a block that are to outlive it; how many exports are there by now.
+    #[inline(always)]
+    fn export_slots(&mut self, mut exported: usize, first: usize, end: End, rows: usize) -> usize {
+        while exported < self.exported.len() && self.exported[exported] < end.places {
+            let place = self.exported[exported] as usize;
+            let touches = self.touches(place) == 1;
+            let copy = &mut self.exports[exported * rows..][..rows];
+            if touches {
+                copy.copy_from_slice(&self.slots[(place - first) * rows..][..rows]);
+            } else {
+                copy.fill([0.0; 4]);
+            }
+            exported += 1;
+        }
+        exported
+    }
+
+    /// 1 if the pair at a place touched when it was evaluated, else 0.
+    #[inline(always)]
+    pub(crate) fn touches(&self, place: usize) -> usize {
+        usize::from(self.lanes[place / 4] >> (place % 4) & 1)
+    }
+
+    /// Adds the touching pairs of a block to the sums of both grains, in their order.
+    #[inline(always)]
+    fn sum_block<L: Lanes4, const ROWS: usize>(&mut self, first: usize, from: End, end: End) {
+        // Which pairs touch cannot be foreseen: they are picked out without a branch.
+        let mut touching = 0;
+        for &place in &self.order[from.pairs as usize..end.pairs as usize] {
+            self.found[touching] = place;
+            touching += self.touches(place as usize);
+        }
+        let (start, n, ring) = (self.grains.start, self.grains.len(), self.ring);
+        let slots = self.slots.as_chunks::<ROWS>().0;
+        let sums = self.sums.as_chunks_mut::<ROWS>().0;
+        for &place in &self.found[..touching] {
+            let place = place as usize;
+            let slot = Sum::<L>::load(&slots[place - first]);
+            let i = (self.i[place] as usize - start) & (ring - 1);
+            let j = self.j[place] as usize - start;
+            // Partners in later chunks take theirs from the exports.
+            let j = if j < n { j & (ring - 1) } else { ring };
+            let mut sum = Sum::<L>::load(&sums[i]);
+            sum.add(&slot);
+            sum.store(&mut sums[i]);
+            let mut sum = Sum::<L>::load(&sums[j]);
+            sum.subtract(&slot);
+            sum.store(&mut sums[j]);
+        }
+    }
+
+    /// Takes the sum of a grain out of the ring.
+    #[inline(always)]
+    fn take_sum<L: Lanes4, const ROWS: usize>(&mut self, g: usize) -> Sum<L> {
+        let at = (g - self.grains.start) & (self.ring - 1);
+        let rows = &mut self.sums.as_chunks_mut::<ROWS>().0[at];
+        let sum = Sum::load(rows);
+        *rows = [[0.0; 4]; ROWS];
+        sum
+    }
+
+    /// Clears the sum of partners in later chunks: the ring is empty between steps.
+    fn clear_beyond(&mut self, rows: usize) {
+        if let Some(beyond) = self.sums.get_mut(self.ring * rows..(self.ring + 1) * rows) {
+            beyond.fill([0.0; 4]);
+        }
+    }
 }
 
 #[inline(always)]
@@ -299,8 +374,7 @@ fn shared_in<L: Lanes4, I: Interaction>(
     let mut cursor = Cursor::default();
     for s in 0..chunk.shared.len() {
         let g = chunk.shared[s].grain as usize;
-        let mut sum = Sum::<L>::load(&chunk.partial[s][..slot_rows::<I>()]);
-        sum.import(all, chunk, s, slot_rows::<I>());
+        let mut sum = Sum::<L>::import(all, chunk, s, slot_rows::<I>());
         sum.lean(sweep.planes, g);
         sum.bear(sweep.loads, g);
         move_grain(sweep, g, &sum, &mut moved, &mut cursor);
@@ -322,18 +396,22 @@ fn move_grain<L: Lanes4>(
     moved: &mut Moved,
     cursor: &mut Cursor,
 ) {
-    let field = &sweep.field;
-    let [first, first_row, first_fixed] = moved.first;
+    let Rows {
+        place,
+        motion,
+        turn,
+    } = sweep.field.rows;
+    let [first_row, first_fixed] = moved.first;
     let body = Body([
-        L::load(&field.place[g]),
-        L::load(&field.motion[g]),
-        L::load(&field.turn[g]),
+        L::load(&place[g].get()),
+        L::load(&motion[g].get()),
+        L::load(&turn[g].get()),
     ]);
-    let Body([place, velocity, turn]) = body.moved(sum, &sweep.motion);
-    place.store(&mut moved.place[g - first]);
-    turn.store(&mut moved.turn[g - first]);
-    let v = &mut moved.motion[g - first];
-    velocity.store(v);
+    let body = body.moved(sum, &sweep.motion);
+    let v = body.row(1);
+    place[g].set(body.row(0));
+    motion[g].set(v);
+    turn[g].set(body.row(2));
     while sweep.rows[first_row + cursor.row].end as usize <= g {
         cursor.row += 1;
     }
