@@ -21,6 +21,7 @@ mod grid;
 mod lanes;
 mod ledger;
 mod links;
+mod loads;
 mod motion;
 mod neighbours;
 mod observe;

@@ -8,7 +8,7 @@
 //! radius, which cancels: `d(Rω)/dt = 5/(2m) (T + M/R)`.
 //!
 //! Order of a grain's sum: its pairs in the order of the Verlet list, which are those as `j` by rising
-//! `i` and then those as `i`, then planes.
+//! `i` and then those as `i`, then planes, then loads.
 
 use crate::chunk::Chunk;
 use crate::grains::SPHERE_INERTIA;
@@ -159,6 +159,9 @@ pub(crate) fn total(
         }
     }
     for (g, total) in totals.iter_mut().enumerate() {
-        change(total, &|sum| sum.lean(planes, g));
+        change(total, &|sum| {
+            sum.lean(planes, g);
+            sum.bear(loads, g);
+        });
     }
 }

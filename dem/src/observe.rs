@@ -27,12 +27,6 @@ impl Visitor for Store<'_> {
 }
 
 impl Simulation {
-    /// Force and both moments on a grain at this instant.
-    pub(crate) fn gather(&self, i: usize) -> [[f64; 4]; 3] {
-        let (reach, planes) = (&self.reach, &self.plane_contacts);
-        motion::gather(reach, planes, &self.loads, self.slot_rows(), i)
-    }
-
     /// Velocity and angular velocity of a grain at the time of its position.
     pub(crate) fn synchronised(&self, i: usize) -> (Vector3<f64>, Vector3<f64>) {
         let (v, s) = (&self.grains.motion[i], &self.grains.turn[i]);

@@ -9,6 +9,7 @@ use crate::forces::{self, Field};
 use crate::grains::{Grains, vector};
 use crate::lanes::Width;
 use crate::ledger::EnergyLedger;
+use crate::loads::Loads;
 use crate::motion::{self, Motion};
 use crate::neighbours::Neighbours;
 use crate::places::Places;
@@ -327,7 +328,7 @@ impl Simulation {
             self.pass(Pass::Forces, 0.0);
             self.totals.resize(self.grains.len(), [[0.0; 4]; 3]);
             let (walls, rows) = (&self.plane_contacts, self.slot_rows());
-            motion::total(&self.reach, walls, rows, &mut self.totals);
+            motion::total(&self.reach, walls, &self.loads, rows, &mut self.totals);
             self.current = true;
         }
     }
@@ -377,6 +378,7 @@ impl Simulation {
                 step,
             },
             planes: &self.plane_contacts,
+            loads: &self.loads,
             totals: &self.totals,
             rows: &self.list.rows,
             motion: Motion {
