@@ -26,7 +26,7 @@ pub fn sheared_bed(
         gravity: Vector3::new(slope.sin(), 0.0, -slope.cos()),
         law: law.into(),
         grains: bed.grains,
-        planes: Vec::new(),
+        walls: Vec::new(),
         timestep: step(),
         threads,
     })?;

@@ -90,7 +90,7 @@ fn network_at_rest(seed: u64) -> Snapshot {
     for (i, g) in grains.iter().enumerate().filter(|(_, g)| !g.fixed) {
         contacts.push(ContactSample {
             grain: i,
-            partner: Partner::Plane(0),
+            partner: Partner::Wall(0),
             overlap: 0.01,
             force: -net[i],
             arm: g.radius * random_vector(&mut rng),

@@ -63,7 +63,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             gravity: Vector3::zeros(),
             law: law.into(),
             grains,
-            planes: Vec::new(),
+            walls: Vec::new(),
             timestep: 1e-4,
             threads: Threads::Serial,
         })?;

@@ -9,10 +9,10 @@ use crate::grains::{Grains, Next};
 use crate::grid::Grid;
 use crate::ledger::EnergyLedger;
 use crate::neighbours::{Level, Row};
-use crate::planes::PlaneContact;
 use crate::record::Record;
 use crate::setup::{Setup, SetupError};
 use crate::simulation::Simulation;
+use crate::walls::{Course, Span, Standing, WallContact, WallImpulse};
 use nalgebra::Vector3;
 
 fn flatten<const N: usize>(rows: &[[f64; N]]) -> Vec<f64> {
@@ -31,6 +31,18 @@ fn narrow(name: &str, wide: &[u64]) -> Result<Vec<u32>, String> {
     wide.iter()
         .map(|&x| u32::try_from(x).map_err(|_| format!("array `{name}` has the number {x}")))
         .collect()
+}
+
+/// The real numbers called `name`, of which there must be `len`.
+fn sized<'a>(record: &'a Record, name: &str, len: usize) -> Result<&'a [f64], String> {
+    let values = record.numbers(name)?;
+    if values.len() == len {
+        return Ok(values);
+    }
+    let found = values.len();
+    Err(format!(
+        "array `{name}` has {found} numbers, expected {len}"
+    ))
 }
 
 impl Simulation {
@@ -61,10 +73,15 @@ impl Simulation {
         numbers("list/grid", grids.flatten().collect());
         numbers("list/skin", vec![self.skin, self.hold]);
         numbers("list/age", vec![self.list.age]);
-        let walls = &self.plane_contacts;
-        let histories: Vec<_> = walls.contacts.iter().map(|c| c.history).collect();
-        numbers("planes/history", flatten(&histories));
-        numbers("planes/clearance", walls.clearance().to_vec());
+        let walls: Vec<&WallContact> = self.wall_contacts.touching().collect();
+        let histories: Vec<_> = walls.iter().map(|c| c.history).collect();
+        numbers("walls/history", flatten(&histories));
+        let normals: Vec<_> = walls.iter().map(|c| c.normal).collect();
+        numbers("walls/normal", flatten(&normals));
+        let courses = self.walls.iter().map(|w| [w.course.along, w.course.speed]);
+        numbers("walls/course", courses.flatten().collect());
+        let impulses = self.walls.iter().flat_map(|w| w.impulse.numbers());
+        numbers("walls/impulse", impulses.collect());
         numbers("wall_impulse", self.impulse.to_vec());
         numbers("momentum_account", self.account.iter().copied().collect());
         numbers("largest_overlap", vec![self.deepest]);
@@ -86,12 +103,8 @@ impl Simulation {
         counts("list/row_end", wide(&ends));
         let cells = self.list.levels.iter().flat_map(|l| l.grid.cells);
         counts("list/cells", cells.map(|c| c as u64).collect());
-        let of: Vec<u32> = walls
-            .contacts
-            .iter()
-            .flat_map(|c| [c.grain, c.plane])
-            .collect();
-        counts("planes/contact", wide(&of));
+        let of: Vec<u32> = walls.iter().flat_map(|c| [c.grain, c.wall]).collect();
+        counts("walls/contact", wide(&of));
         counts(
             "steps",
             vec![
@@ -133,17 +146,7 @@ impl Simulation {
             return Err("array `grains/id` does not number the grains of this scene".into());
         }
         self.next_id = next_id as u32;
-        let sized = |name: &str, len: usize| -> Result<&[f64], String> {
-            let values = record.numbers(name)?;
-            if values.len() == len {
-                Ok(values)
-            } else {
-                Err(format!(
-                    "array `{name}` has {} numbers, expected {len}",
-                    values.len()
-                ))
-            }
-        };
+        let sized = |name: &str, len: usize| sized(record, name, len);
         let mut grains = Grains {
             place: rows(sized("grains/place", 4 * n)?),
             motion: rows(sized("grains/motion", 4 * n)?),
@@ -246,32 +249,6 @@ impl Simulation {
         self.grains = grains;
         self.weigh();
 
-        let of = narrow("planes/contact", record.counts("planes/contact")?)?;
-        let histories: Vec<[f64; HISTORY_MAX]> =
-            rows(sized("planes/history", of.len() / 2 * HISTORY_MAX)?);
-        let contacts: Vec<PlaneContact> = of
-            .as_chunks::<2>()
-            .0
-            .iter()
-            .zip(histories)
-            .map(|(&[grain, plane], history)| PlaneContact {
-                grain,
-                plane,
-                history,
-                slot: [[0.0; 4]; 3],
-            })
-            .collect();
-        let sorted = contacts.windows(2).all(|w| w[0].grain <= w[1].grain);
-        if !sorted
-            || contacts
-                .iter()
-                .any(|c| c.grain as usize >= n || c.plane as usize >= self.planes.len())
-        {
-            return Err("array `planes/contact` names unknown grains or planes".into());
-        }
-        let clearance = sized("planes/clearance", ends.len() * self.planes.len())?.to_vec();
-        self.plane_contacts.restore(contacts, clearance, n);
-
         self.impulse.copy_from_slice(sized("wall_impulse", 3)?);
         self.account = Vector3::from_column_slice(sized("momentum_account", 3)?);
         self.deepest = sized("largest_overlap", 1)?[0];
@@ -282,8 +259,43 @@ impl Simulation {
         };
         (self.steps, self.steps_since_start) = (steps, since_start);
         self.springs_current = springs_current != 0;
+        self.read_walls(record)?;
         self.renew_rows();
         self.take_histories(touching, springs);
+        Ok(())
+    }
+
+    /// Takes up walls and the contacts with them; steps and lists are known.
+    fn read_walls(&mut self, record: &Record) -> Result<(), String> {
+        let walls = self.walls.len();
+        let courses = sized(record, "walls/course", 2 * walls)?;
+        let impulses = sized(record, "walls/impulse", WallImpulse::NUMBERS * walls)?;
+        let step = Span::ending(self.steps, self.timestep);
+        let courses = courses.as_chunks::<2>().0.iter();
+        let impulses = impulses.as_chunks().0.iter();
+        for ((wall, &[along, speed]), impulse) in self.walls.iter_mut().zip(courses).zip(impulses) {
+            *wall = Standing::at(wall.wall.clone(), step, Course { along, speed });
+            wall.impulse = WallImpulse::from_numbers(impulse);
+        }
+        let of = narrow("walls/contact", record.counts("walls/contact")?)?;
+        let of = of.as_chunks::<2>().0;
+        let histories: Vec<[f64; HISTORY_MAX]> =
+            rows(sized(record, "walls/history", of.len() * HISTORY_MAX)?);
+        let normals: Vec<[f64; 3]> = rows(sized(record, "walls/normal", of.len() * 3)?);
+        let n = self.grains.len();
+        let known = |&[grain, wall]: &[u32; 2]| (grain as usize) < n && (wall as usize) < walls;
+        if !of.iter().all(known) {
+            return Err("array `walls/contact` names unknown grains or walls".into());
+        }
+        let contacts = of.iter().zip(histories).zip(normals);
+        let contacts = contacts.map(|((&[grain, wall], history), normal)| WallContact {
+            history,
+            normal,
+            touching: true,
+            ..WallContact::apart(grain, wall)
+        });
+        self.wall_contacts.take_up(contacts.collect());
+        self.list_walls();
         Ok(())
     }
 }

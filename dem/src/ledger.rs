@@ -2,7 +2,7 @@
 //!
 //! Leap-frog changes the kinetic energy of a grain by exactly the force times the mean of its velocities
 //! before and after the kick. Booked with that velocity, the work of all contacts, of gravity and of
-//! moved grains adds up to the kinetic energy *to round-off*, at any time step:
+//! moved grains and walls adds up to the kinetic energy *to round-off*, at any time step:
 //!
 //! ```text
 //! K(now) = K(start) + Σ W_channel + W_gravity + W_drive + W_loads + W_bonds
@@ -15,8 +15,8 @@
 use crate::bonds::Bond;
 use crate::contact::Stored;
 use crate::grains::{SPHERE_INERTIA, vector};
-use crate::planes::Plane;
 use crate::simulation::Simulation;
+use crate::walls::Span;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -88,7 +88,7 @@ pub struct EnergyLedger {
     pub work: Channels,
     /// Work of gravity.
     pub gravity: f64,
-    /// Work put in by grains that move as they are told.
+    /// Work put in by walls and grains that move as they are told.
     pub drive: f64,
     /// Work of steady loads.
     #[serde(default)]
@@ -335,15 +335,31 @@ impl Simulation {
                 ledger.loads += kick * power;
             }
         }
-        for contact in &self.plane_contacts.contacts {
-            let grain = &moving[contact.grain as usize];
-            let Plane { normal, .. } = &self.planes[contact.plane as usize];
-            if !grain.fixed {
-                let against = [grain.velocity, grain.turn, grain.spin];
-                book(&mut ledger.work, &contact.slot, normal, kick, against);
-            }
-        }
+        self.book_walls(&mut ledger, &moving, kick);
         self.ledger = Some(ledger);
+    }
+
+    /// Books the work of contacts with walls; what a moving wall gives is drive. Its velocity, too, is
+    /// the mean of those before and after the kick.
+    fn book_walls(&self, ledger: &mut EnergyLedger, moving: &[Moving], kick: f64) {
+        let next = Span::ending(self.steps + 1, self.timestep);
+        for contact in self.wall_contacts.touching() {
+            let i = contact.grain as usize;
+            let (grain, wall) = (&moving[i], &self.walls[contact.wall as usize]);
+            let (normal, slot) = (Vector3::from(contact.normal), &contact.slot);
+            let (mut velocity, mut spin) = (Vector3::zeros(), Vector3::zeros());
+            if wall.moves() {
+                let x = &self.grains.place[i];
+                let arm = wall.seen(&vector(x), &self.domain) - normal * (x[3] - contact.overlap);
+                let stride = wall.stride(next);
+                spin = 0.5 * (wall.spin + stride.spin);
+                velocity = 0.5 * (wall.velocity + stride.velocity) + spin.cross(&arm);
+                let power = vector(&slot[0]).dot(&velocity) + vector(&slot[2]).dot(&spin);
+                ledger.drive += kick * power;
+            }
+            let against = [grain.velocity - velocity, grain.turn, grain.spin - spin];
+            book(&mut ledger.work, slot, &normal, kick, against);
+        }
     }
 }
 

@@ -1,6 +1,6 @@
 //! Discrete element engine: grains, contact laws, search, walls, preparation.
 //!
-//! * A scene hands over a [`Setup`]: grains, planes, a contact law, gravity, a time step.
+//! * A scene hands over a [`Setup`]: grains, walls, a contact law, gravity, a time step.
 //! * [`Simulation::advance`] integrates Newton's equations by leap-frog.
 //! * [`Simulation::snapshot`] shows all grains and contacts of one instant; coarse-graining and
 //!   output need nothing else.
@@ -26,7 +26,6 @@ mod motion;
 mod neighbours;
 mod observe;
 mod places;
-mod planes;
 mod population;
 pub mod preparation;
 mod reach;
@@ -40,6 +39,7 @@ mod state_hash;
 mod sweep;
 pub mod timestep;
 mod validity;
+pub mod walls;
 
 pub use bonds::{
     BondCount, BondRule, BondState, BondStress, Cement, Cluster, Clusters, Section as BondSection,
@@ -54,10 +54,10 @@ pub use energy::Energy;
 pub use grains::Grain;
 pub use ledger::{Bonding, Channels, EnergyLedger};
 pub use loads::Load;
-pub use planes::Plane;
 pub use record::Record;
 pub use region::Region;
 pub use setup::{Setup, SetupError, Threads};
 pub use simulation::{Diverged, Simulation};
 pub use snapshot::{BondSample, ContactSample, GrainSample, Partner, Snapshot};
 pub use state_hash::StateHash;
+pub use walls::{Motion, Pose, Shape, Side, Wall, WallImpulse, WallLoad};

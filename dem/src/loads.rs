@@ -1,7 +1,7 @@
 //! Forces and moments on grains besides those of contacts.
 //!
 //! One pair of rows a grain, filled at the start of a step from the present positions and added to
-//! the grain's sum after its pairs and planes:
+//! the grain's sum after its pairs and walls:
 //!
 //! ```text
 //! d(m v)/dt = Σ F_contact + m g + F_load        d(I ω)/dt = Σ M_contact + M_load

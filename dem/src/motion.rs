@@ -8,14 +8,14 @@
 //! radius, which cancels: `d(Rω)/dt = 5/(2m) (T + M/R)`.
 //!
 //! Order of a grain's sum: its pairs in the order of the Verlet list, which are those as `j` by rising
-//! `i` and then those as `i`, then planes, then loads.
+//! `i` and then those as `i`, then walls, then loads.
 
 use crate::chunk::Chunk;
 use crate::grains::SPHERE_INERTIA;
 use crate::lanes::{Lanes4, Portable};
 use crate::loads::Loads;
-use crate::planes::PlaneContacts;
 use crate::reach::Reach;
+use crate::walls::WallContacts;
 
 /// Force, moment of the tangential force, further moment on a grain.
 #[derive(Clone, Copy)]
@@ -42,10 +42,10 @@ impl<L: Lanes4> Sum<L> {
         sum
     }
 
-    /// Adds the planes.
+    /// Adds the walls.
     #[inline(always)]
-    pub fn lean(&mut self, planes: &PlaneContacts, grain: usize) {
-        for contact in planes.of(grain) {
+    pub fn lean(&mut self, walls: &WallContacts, grain: usize) {
+        for contact in walls.of(grain) {
             self.add(&Sum::load(&contact.slot));
         }
     }
@@ -138,7 +138,7 @@ impl<L: Lanes4> Body<L> {
 /// of all pairs.
 pub(crate) fn total(
     reach: &Reach,
-    planes: &PlaneContacts,
+    walls: &WallContacts,
     loads: &Loads,
     rows: usize,
     totals: &mut [[[f64; 4]; 3]],
@@ -160,7 +160,7 @@ pub(crate) fn total(
     }
     for (g, total) in totals.iter_mut().enumerate() {
         change(total, &|sum| {
-            sum.lean(planes, g);
+            sum.lean(walls, g);
             sum.bear(loads, g);
         });
     }

@@ -94,21 +94,15 @@ impl Simulation {
                 partner_arm: apart * (b[3] / radii),
             });
         }
-        for contact in &self.plane_contacts.contacts {
+        for contact in self.wall_contacts.touching() {
             let i = contact.grain as usize;
-            let plane = &self.planes[contact.plane as usize];
-            let x = &self.grains.place[i];
-            let distance = plane.distance(&vector(x));
-            let held = self.holds(&contact.history[..self.layout.history]);
-            if (distance >= x[3] && !held) || self.grains.is_fixed(i) {
-                continue;
-            }
+            let distance = self.grains.place[i][3] - contact.overlap;
             into.contacts.push(ContactSample {
                 grain: i,
-                partner: Partner::Plane(contact.plane as usize),
-                overlap: x[3] - distance,
+                partner: Partner::Wall(contact.wall as usize),
+                overlap: contact.overlap,
                 force: vector(&contact.slot[0]),
-                arm: -plane.normal * distance,
+                arm: -Vector3::from(contact.normal) * distance,
                 partner_arm: Vector3::zeros(),
             });
         }
@@ -141,22 +135,16 @@ impl Simulation {
                 &history[..width],
             );
         }
-        for contact in &self.plane_contacts.contacts {
+        for contact in self.wall_contacts.touching() {
             let i = contact.grain as usize;
-            let plane = &self.planes[contact.plane as usize];
-            let x = &self.grains.place[i];
-            let overlap = x[3] - plane.distance(&vector(x));
-            if !self.grains.is_fixed(i) {
-                let pair = self.pair(i, plane.material);
-                let curvature = self.grains.turn[i][3];
-                self.add_stored(
-                    &mut energy,
-                    pair,
-                    overlap,
-                    curvature,
-                    &contact.history[..width],
-                );
-            }
+            let pair = self.pair(i, self.walls[contact.wall as usize].wall.material);
+            self.add_stored(
+                &mut energy,
+                pair,
+                contact.overlap,
+                self.grains.turn[i][3],
+                &contact.history[..width],
+            );
         }
         energy.bonds = self.bond_energy();
         energy
@@ -213,7 +201,7 @@ impl Simulation {
             .sum()
     }
 
-    /// Momentum that fixed grains and planes have taken from the free grains since the start (N s).
+    /// Momentum that fixed grains and walls have taken from the free grains since the start (N s).
     ///
     /// With constant gravity g: `momentum(t) + wall_impulse(t) - m g t` is constant to round-off, up
     /// to half a step's force, since velocities inside live half a step back.
@@ -307,8 +295,8 @@ impl Simulation {
             hash.take(u64::from(a) << 32 | u64::from(b));
             block.iter().for_each(|row| hash.take(row[k % 4].to_bits()));
         }
-        let mut walls: Vec<_> = self.plane_contacts.contacts.iter().collect();
-        walls.sort_by_key(|c| (self.grains.id[c.grain as usize], c.plane));
+        let mut walls: Vec<_> = self.wall_contacts.touching().collect();
+        walls.sort_by_key(|c| (self.grains.id[c.grain as usize], c.wall));
         for c in walls
             .into_iter()
             .filter(|c| c.history.iter().any(|&h| h != 0.0))

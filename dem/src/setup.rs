@@ -6,8 +6,8 @@ use crate::contact::{
 };
 use crate::domain::Domain;
 use crate::grains::Grain;
-use crate::planes::Plane;
 use crate::timestep::{self, Choice, Conditions, Limit, Pair, Shares};
+use crate::walls::Wall;
 use nalgebra::Vector3;
 
 /// Whether a step is shared out over threads. The results are the same bits.
@@ -31,8 +31,8 @@ pub struct Setup {
     pub law: Laws,
     /// The grains; their order is their number.
     pub grains: Vec<Grain>,
-    /// Plane walls.
-    pub planes: Vec<Plane>,
+    /// Walls; their order is their number.
+    pub walls: Vec<Wall>,
     /// Length of a step (s).
     pub timestep: f64,
     /// Sharing of a step over threads.
@@ -249,14 +249,9 @@ impl Setup {
         }
         let materials = self.law.own.len();
         let largest = check_grains(&self.grains, materials)?;
-        for (k, p) in self.planes.iter().enumerate() {
-            check(
-                &format!("planes[{k}].normal"),
-                p.normal.norm(),
-                "a unit vector",
-                |v| (v - 1.0).abs() < 1e-9,
-            )?;
-            known_material(p.material, materials)?;
+        for (k, wall) in self.walls.iter().enumerate() {
+            wall.validate(&format!("walls[{k}]"))?;
+            known_material(wall.material, materials)?;
         }
         check_box(&self.domain, largest, skin)?;
         Ok(law)
@@ -272,10 +267,10 @@ impl Setup {
         for grain in &self.grains {
             known_material(grain.material, laws.materials())?;
         }
-        for plane in &self.planes {
-            known_material(plane.material, laws.materials())?;
+        for wall in &self.walls {
+            known_material(wall.material, laws.materials())?;
         }
-        let walls: Vec<u16> = self.planes.iter().map(|p| p.material).collect();
+        let walls: Vec<u16> = self.walls.iter().map(|w| w.material).collect();
         let limits = timestep::limits(&self.grains, &walls, &laws, conditions, shares);
         Ok(timestep::choose(limits, shares.safety))
     }

@@ -2,7 +2,7 @@
 
 use crate::bonds::Bonds;
 use crate::contact::composition::Visitor;
-use crate::contact::{ContactLaw, HISTORY_MAX, Interaction, LawTable, Step};
+use crate::contact::{ContactLaw, Interaction, LawTable, Step};
 use crate::contacts::Touching;
 use crate::domain::{Domain, Images};
 use crate::forces::{self, Field};
@@ -13,7 +13,6 @@ use crate::loads::Loads;
 use crate::motion::{self, Motion};
 use crate::neighbours::Neighbours;
 use crate::places::Places;
-use crate::planes::{Plane, PlaneContacts};
 use crate::population::GONE;
 use crate::reach::{Making, Reach};
 use crate::rows::Rows;
@@ -21,6 +20,7 @@ use crate::setup::{Setup, SetupError, Threads};
 use crate::snapshot::GrainSample;
 use crate::sweep::{self, Moved, Pass, Sweep};
 use crate::timestep::{self, Body, Classes, Conditions, Remedy, Shares};
+use crate::walls::{Age, Course, Scene, Span, Standing, Wall, WallContacts};
 use nalgebra::Vector3;
 use std::sync::Arc;
 
@@ -124,13 +124,6 @@ impl Visitor for RunPass<'_> {
     }
 }
 
-/// Histories of all plane contacts.
-#[derive(Clone, Debug, Default)]
-struct Springs {
-    planes: Vec<[f64; HISTORY_MAX]>,
-    springs_current: bool,
-}
-
 /// Grains in motion.
 #[derive(Clone, Debug)]
 pub struct Simulation {
@@ -140,7 +133,7 @@ pub struct Simulation {
     pub(crate) layout: Layout,
     /// Largest gap that any established contact holds across (m).
     pub(crate) hold: f64,
-    pub(crate) planes: Vec<Plane>,
+    pub(crate) walls: Vec<Standing>,
     pub(crate) timestep: f64,
     pub(crate) parallel: bool,
     /// Registers that steps use; all give the same bits.
@@ -152,7 +145,7 @@ pub struct Simulation {
     pub(crate) next_id: u32,
     pub(crate) list: Neighbours,
     pub(crate) reach: Reach,
-    pub(crate) plane_contacts: PlaneContacts,
+    pub(crate) wall_contacts: WallContacts,
     pub(crate) loads: Loads,
     pub(crate) bonds: Bonds,
     /// Rows by grain number, as of the last build of lists with loads.
@@ -164,7 +157,7 @@ pub struct Simulation {
     /// Fixed grains in order, and the momentum each has taken since it was last counted (N s).
     fixed: Vec<u32>,
     taken: Vec<[f64; 4]>,
-    /// Momentum taken by fixed grains and planes since the start (N s).
+    /// Momentum taken by fixed grains and walls since the start (N s).
     pub(crate) impulse: [f64; 3],
     /// Momentum that grains and walls together must hold by now: that of the start plus what gravity
     /// gave (N s).
@@ -177,8 +170,8 @@ pub struct Simulation {
     pub(crate) totals: Vec<[[f64; 4]; 3]>,
     /// Whether springs are already stretched to the present positions.
     pub(crate) springs_current: bool,
-    /// Springs before the forces of the present positions were looked at out of turn.
-    before: Springs,
+    /// The same, before the forces of the present positions were looked at out of turn.
+    springs_were_current: bool,
     pub(crate) steps: u64,
     /// Steps since velocities were last given: the first kick after that is half a step.
     pub(crate) steps_since_start: u64,
@@ -196,6 +189,24 @@ fn skin_of(smallest: f64) -> f64 {
 fn hold_of(law: &LawTable, largest: f64) -> f64 {
     let hold = |law: &ContactLaw| law.reach(largest);
     law.laws().iter().map(hold).fold(0.0, f64::max)
+}
+
+/// Walls at the start.
+fn stand(walls: Vec<Wall>, timestep: f64) -> Vec<Standing> {
+    let before = Span::ending(0, timestep);
+    let walls = walls.into_iter();
+    walls
+        .map(|wall| Standing::at(wall, before, Course::default()))
+        .collect()
+}
+
+/// How long the Verlet list has lasted.
+fn age_of(list: &Neighbours) -> Age<'_> {
+    Age {
+        rows: &list.rows,
+        travel: &list.travel,
+        time: list.age,
+    }
 }
 
 impl Simulation {
@@ -220,7 +231,7 @@ impl Simulation {
             layout: law.visit(LayoutOf),
             hold: hold_of(&law, largest_radius),
             law: Arc::new(law),
-            planes: setup.planes,
+            walls: stand(setup.walls, setup.timestep),
             timestep: setup.timestep,
             parallel: setup.threads == Threads::Rayon,
             width: Width::widest(),
@@ -230,7 +241,7 @@ impl Simulation {
             next_id: setup.grains.len() as u32,
             list: Neighbours::default(),
             reach: Reach::new(skin / SKIN),
-            plane_contacts: PlaneContacts::default(),
+            wall_contacts: WallContacts::default(),
             loads: Loads::default(),
             bonds: Bonds::default(),
             places: Places::default(),
@@ -244,7 +255,7 @@ impl Simulation {
             current: false,
             totals: Vec::new(),
             springs_current: false,
-            before: Springs::default(),
+            springs_were_current: false,
             steps: 0,
             steps_since_start: 0,
             deepest: 0.0,
@@ -300,10 +311,8 @@ impl Simulation {
         }
         self.reach.remember();
         self.bonds.remember();
-        self.before.planes.clear();
-        let walls = self.plane_contacts.contacts.iter();
-        self.before.planes.extend(walls.map(|c| c.history));
-        self.before.springs_current = self.springs_current;
+        self.wall_contacts.remember();
+        self.springs_were_current = self.springs_current;
         self.evaluate_forces();
     }
 
@@ -314,11 +323,8 @@ impl Simulation {
         }
         self.reach.recall();
         self.bonds.recall();
-        let walls = self.plane_contacts.contacts.iter_mut();
-        for (contact, history) in walls.zip(&self.before.planes) {
-            contact.history = *history;
-        }
-        self.springs_current = self.before.springs_current;
+        self.wall_contacts.recall();
+        self.springs_current = self.springs_were_current;
         self.current = false;
     }
 
@@ -327,7 +333,7 @@ impl Simulation {
         if !self.current {
             self.pass(Pass::Forces, 0.0);
             self.totals.resize(self.grains.len(), [[0.0; 4]; 3]);
-            let (walls, rows) = (&self.plane_contacts, self.slot_rows());
+            let (walls, rows) = (&self.wall_contacts, self.slot_rows());
             motion::total(&self.reach, walls, &self.loads, rows, &mut self.totals);
             self.current = true;
         }
@@ -354,9 +360,13 @@ impl Simulation {
         let walls = if pass == Pass::Motion {
             0.0
         } else {
-            let planes = &self.planes;
-            self.plane_contacts
-                .evaluate(law, planes, &self.grains, lever, step)
+            let scene = Scene {
+                grains: &self.grains,
+                domain: &self.domain,
+                lever,
+                step,
+            };
+            self.wall_contacts.evaluate(law, &mut self.walls, &scene)
         };
         if pass != Pass::Motion {
             self.evaluate_loads(step.stretch);
@@ -377,7 +387,7 @@ impl Simulation {
                 hold: self.hold,
                 step,
             },
-            planes: &self.plane_contacts,
+            walls: &self.wall_contacts,
             loads: &self.loads,
             totals: &self.totals,
             rows: &self.list.rows,
@@ -397,12 +407,15 @@ impl Simulation {
         pairs.max(walls)
     }
 
-    /// Books what a step has done to momentum and to the lists' lifetimes.
+    /// Books what a step has done to momentum and to the lists' lifetimes, and moves the walls.
     fn keep_accounts(&mut self, kick: f64) {
-        for contact in &self.plane_contacts.contacts {
-            for k in 0..3 {
-                self.impulse[k] -= kick * contact.slot[0][k];
+        let next = Span::ending(self.steps + 1, self.timestep);
+        for wall in &mut self.walls {
+            for (sum, force) in self.impulse.iter_mut().zip(wall.load.force.iter()) {
+                *sum += kick * force;
             }
+            wall.impulse.take(&wall.load, kick);
+            wall.advance(next);
         }
         self.account += kick * (self.weighed * self.gravity + self.loads.external);
         self.list.age += self.timestep;
@@ -425,27 +438,46 @@ impl Simulation {
 
     /// Renews the lists where grains may have outrun them.
     fn keep_lists(&mut self) -> Result<(), Diverged> {
-        let list = &self.list;
-        let walls = self
-            .plane_contacts
-            .outdated(&self.planes, &list.rows, &list.travel, list.age);
-        let list = &mut self.list;
-        if walls || list.outdated(self.skin) {
-            self.check()?;
-            // A list that does not outlive one step cannot promise that no contact was missed.
-            if self.list.age < 1.5 * self.timestep {
-                return Err(Diverged::Leap {
-                    skin: self.skin,
-                    time: self.time(),
-                    timestep: self.timestep,
-                    remedy: self.remedy(true),
-                });
-            }
+        if self.list.outdated(self.skin) {
+            self.outlived(self.list.age)?;
             self.rebuild();
-        } else if self.reach.outdated(&self.list) {
+            return Ok(());
+        }
+        if self.wall_contacts.outdated(&self.walls, age_of(&self.list)) {
+            self.outlived(self.wall_contacts.age(self.list.age))?;
+            self.wall_contacts.take_down(|grain| grain);
+            self.list_walls();
+        }
+        if self.reach.outdated(&self.list) {
             self.make_reach(false);
         }
         Ok(())
+    }
+
+    /// Checks the state before a list of this age (s) is made anew: one that does not outlive one step
+    /// cannot promise that no contact was missed.
+    fn outlived(&self, age: f64) -> Result<(), Diverged> {
+        self.check()?;
+        if age < 1.5 * self.timestep {
+            return Err(Diverged::Leap {
+                skin: self.skin,
+                time: self.time(),
+                timestep: self.timestep,
+                remedy: self.remedy(true),
+            });
+        }
+        Ok(())
+    }
+
+    /// Lists the grains near walls.
+    pub(crate) fn list_walls(&mut self) {
+        self.wall_contacts.list(
+            &mut self.walls,
+            &self.grains,
+            &self.domain,
+            self.skin + self.hold,
+            age_of(&self.list),
+        );
     }
 
     fn check(&self) -> Result<(), Diverged> {
@@ -481,7 +513,7 @@ impl Simulation {
             mass: self.grains.mass[i],
             fixed: self.grains.is_fixed(i),
         });
-        let walls: Vec<u16> = self.planes.iter().map(|p| p.material).collect();
+        let walls: Vec<u16> = self.walls.iter().map(|w| w.wall.material).collect();
         let classes = Classes::of(bodies, &walls);
         let choice = |speed: f64| {
             let conditions = Conditions {
@@ -540,8 +572,8 @@ impl Simulation {
         };
         self.touching
             .collect(&mut self.reach, &mut self.grains, self.layout, &place);
-        self.plane_contacts
-            .build(&self.planes, &self.grains, &list.rows, listed, place);
+        self.wall_contacts.take_down(place);
+        self.list_walls();
         self.settle_loads();
         self.renew_rows();
         self.make_reach(true);

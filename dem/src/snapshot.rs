@@ -28,8 +28,8 @@ pub struct GrainSample {
 pub enum Partner {
     /// Index into [`Snapshot::grains`].
     Grain(usize),
-    /// Index of the plane wall.
-    Plane(usize),
+    /// Index of the wall.
+    Wall(usize),
 }
 
 /// A contact at one instant. Each pair appears once.

@@ -17,8 +17,8 @@ use crate::lanes::{Lanes, Lanes4, Portable, Width};
 use crate::loads::Loads;
 use crate::motion::{Body, Motion, Sum};
 use crate::neighbours::Row;
-use crate::planes::PlaneContacts;
 use crate::rows::Rows;
+use crate::walls::WallContacts;
 
 /// What a sweep does.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -39,7 +39,7 @@ pub(crate) struct Sweep<'a> {
     /// Whether chunks are shared out over threads.
     pub parallel: bool,
     pub field: Field<'a>,
-    pub planes: &'a PlaneContacts,
+    pub walls: &'a WallContacts,
     pub loads: &'a Loads,
     /// Sums of all grains, for [`Pass::Motion`].
     pub totals: &'a [[[f64; 4]; 3]],
@@ -260,7 +260,7 @@ fn chunk_in<L: Lanes, I: Interaction, const ROWS: usize>(
                     shared += 1;
                     continue;
                 }
-                sum.lean(sweep.planes, g);
+                sum.lean(sweep.walls, g);
                 sum.bear(sweep.loads, g);
                 move_grain(sweep, g, &sum, &mut moved, &mut cursor);
             }
@@ -377,7 +377,7 @@ fn shared_in<L: Lanes4, I: Interaction>(
     for s in 0..chunk.shared.len() {
         let g = chunk.shared[s].grain as usize;
         let mut sum = Sum::<L>::import(all, chunk, s, slot_rows::<I>());
-        sum.lean(sweep.planes, g);
+        sum.lean(sweep.walls, g);
         sum.bear(sweep.loads, g);
         move_grain(sweep, g, &sum, &mut moved, &mut cursor);
     }
@@ -437,8 +437,8 @@ fn move_grain<L: Lanes4>(
 mod tests {
     use crate::lanes::Width;
     use crate::{
-        ContactLaw, Domain, Elasticity, Epsd, Grain, Hooke, Laws, Plane, Rolling, Setup,
-        Simulation, TangentialSpring, Threads,
+        ContactLaw, Domain, Elasticity, Epsd, Grain, Hooke, Laws, Rolling, Setup, Simulation,
+        TangentialSpring, Threads, Wall,
     };
     use nalgebra::Vector3;
 
@@ -464,11 +464,7 @@ mod tests {
             gravity: Vector3::new(1.0, 0.0, -9.81),
             law,
             grains,
-            planes: vec![Plane {
-                point: Vector3::zeros(),
-                normal: Vector3::z(),
-                material: 0,
-            }],
+            walls: vec![Wall::plane(Vector3::zeros(), Vector3::z())],
             timestep: 1e-4,
             threads: Threads::Serial,
         };

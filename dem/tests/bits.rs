@@ -50,11 +50,10 @@ fn setup(threads: Threads) -> Setup {
         gravity: Vector3::new(slope.sin(), 0.0, -slope.cos()),
         law: law().into(),
         grains: bed().grains.clone(),
-        planes: vec![Plane {
-            point: Vector3::new(0.0, 0.0, bed().domain.lower.z),
-            normal: Vector3::z(),
-            material: 0,
-        }],
+        walls: vec![Wall::plane(
+            Vector3::new(0.0, 0.0, bed().domain.lower.z),
+            Vector3::z(),
+        )],
         timestep: 5e-4,
         threads,
     }

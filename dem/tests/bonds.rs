@@ -40,7 +40,7 @@ fn free_space(grains: Vec<Grain>, timestep: f64) -> Setup {
         gravity: Vector3::zeros(),
         law: laws()[0].1.into(),
         grains,
-        planes: Vec::new(),
+        walls: Vec::new(),
         timestep,
         threads: Threads::Serial,
     }
@@ -306,11 +306,10 @@ fn the_ledger_closes_over_a_boulder_that_breaks_on_the_ground() {
     }
     let setup = Setup {
         gravity: Vector3::new(0.0, 0.0, -9.81),
-        planes: vec![Plane {
-            point: Vector3::zeros(),
-            normal: Vector3::new(0.2, 0.0, 1.0).normalize(),
-            material: 0,
-        }],
+        walls: vec![Wall::plane(
+            Vector3::zeros(),
+            Vector3::new(0.2, 0.0, 1.0).normalize(),
+        )],
         law: ContactLaw::hertz_mindlin(MATERIAL, 0.5, 0.5).into(),
         ..free_space(grains, 2e-5)
     };

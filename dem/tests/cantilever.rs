@@ -49,7 +49,7 @@ fn row(free: usize) -> Simulation {
         gravity: Vector3::zeros(),
         law: laws()[0].1.into(),
         grains,
-        planes: Vec::new(),
+        walls: Vec::new(),
         timestep: step,
         threads: Threads::Serial,
     })

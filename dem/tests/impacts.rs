@@ -28,14 +28,14 @@ fn open_box() -> Domain {
     }
 }
 
-fn setup(law: ContactLaw, grains: Vec<Grain>, planes: Vec<Plane>, steps_per_contact: f64) -> Setup {
+fn setup(law: ContactLaw, grains: Vec<Grain>, walls: Vec<Wall>, steps_per_contact: f64) -> Setup {
     Setup {
         domain: open_box(),
         gravity: Vector3::zeros(),
         timestep: law.contact_time(0.5, 0.25, 1.0) / steps_per_contact,
         law: law.into(),
         grains,
-        planes,
+        walls,
         threads: Threads::Serial,
     }
 }
@@ -55,11 +55,7 @@ fn drop_on_floor(law: ContactLaw, degrees: f64, spin: Vector3<f64>, steps: f64) 
     let mut grain = Grain::at_rest(Vector3::new(0.0, 0.0, 0.5 + 1e-9), 0.5, DENSITY);
     grain.velocity = Vector3::new(s, 0.0, -c);
     grain.spin = spin;
-    let floor = Plane {
-        point: Vector3::zeros(),
-        normal: Vector3::z(),
-        material: 0,
-    };
+    let floor = Wall::plane(Vector3::zeros(), Vector3::z());
     Simulation::new(setup(law, vec![grain], vec![floor], steps)).unwrap()
 }
 
@@ -241,11 +237,7 @@ fn gross_sliding_follows_coulomb() {
 fn a_launched_sphere_ends_slipping_at_five_sevenths() {
     let mut grain = Grain::at_rest(Vector3::new(0.0, 0.0, 0.5 - 5e-6), 0.5, DENSITY);
     grain.velocity = Vector3::new(1.0, 0.0, 0.0);
-    let floor = Plane {
-        point: Vector3::zeros(),
-        normal: Vector3::z(),
-        material: 0,
-    };
+    let floor = Wall::plane(Vector3::zeros(), Vector3::z());
     let law = law(0.5, 0.5, None);
     let mut setup = setup(law, vec![grain], vec![floor], 40.0);
     setup.gravity = Vector3::new(0.0, 0.0, -1.0);

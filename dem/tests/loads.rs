@@ -16,7 +16,7 @@ fn lone(fixed: bool) -> Setup {
     Setup {
         grains: vec![grain],
         gravity: Vector3::zeros(),
-        planes: Vec::new(),
+        walls: Vec::new(),
         ..setup(laws()[0].1, 1, STEP)
     }
 }

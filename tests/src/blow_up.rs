@@ -5,8 +5,8 @@ use colluvium_dem::contact::tangential::SpringStiffness;
 use colluvium_dem::timestep::{Conditions, Shares, contact_limit};
 use colluvium_dem::{
     ContactLaw, Damping, Domain, Elasticity, Epsd, Grain, Hertz, Hooke, Jkr, Mindlin, Normal,
-    Plane, Rolling, Setup, SetupError, ShapeParameter, Simulation, Snapshot, Tangential,
-    TangentialSpring, Threads, Viscoelastic,
+    Rolling, Setup, SetupError, ShapeParameter, Simulation, Snapshot, Tangential, TangentialSpring,
+    Threads, Viscoelastic, Wall,
 };
 use nalgebra::Vector3;
 
@@ -215,11 +215,7 @@ impl Trial {
             gravity: Vector3::new(0.0, 0.0, -load / grain.mass()),
             law: self.law.into(),
             grains: vec![grain],
-            planes: vec![Plane {
-                point: Vector3::zeros(),
-                normal: Vector3::z(),
-                material: 0,
-            }],
+            walls: vec![Wall::plane(Vector3::zeros(), Vector3::z())],
             timestep: step,
             threads: Threads::Serial,
         })?;
@@ -263,7 +259,7 @@ impl Trial {
             gravity: Vector3::zeros(),
             law: self.law.into(),
             grains: packing.grains.clone(),
-            planes: Vec::new(),
+            walls: Vec::new(),
             timestep,
             threads: Threads::Serial,
         }

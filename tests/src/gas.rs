@@ -79,7 +79,7 @@ impl Gas {
             timestep: law.contact_time(0.5, 0.25, 1.0) / self.steps_per_contact,
             law: law.into(),
             grains,
-            planes: vec![],
+            walls: vec![],
             threads: Threads::Serial,
         }
     }

@@ -2,7 +2,7 @@
 
 use colluvium_dem::{
     ContactLaw, ContactSample, Domain, Elasticity, Grain, GrainSample, Hertz, Laws, Mindlin,
-    Normal, Partner, Plane, Setup, Simulation, Snapshot, Tangential, Threads,
+    Normal, Partner, Setup, Simulation, Snapshot, Tangential, Threads, Wall,
 };
 use nalgebra::Vector3;
 
@@ -16,22 +16,18 @@ pub fn open_space() -> Domain {
 }
 
 /// The plane z = 0.
-pub fn floor() -> Plane {
-    Plane {
-        point: Vector3::zeros(),
-        normal: Vector3::z(),
-        material: 0,
-    }
+pub fn floor() -> Wall {
+    Wall::plane(Vector3::zeros(), Vector3::z())
 }
 
 /// Grains in open space without gravity.
-pub fn scene(law: impl Into<Laws>, grains: Vec<Grain>, planes: Vec<Plane>, timestep: f64) -> Setup {
+pub fn scene(law: impl Into<Laws>, grains: Vec<Grain>, walls: Vec<Wall>, timestep: f64) -> Setup {
     Setup {
         domain: open_space(),
         gravity: Vector3::zeros(),
         law: law.into(),
         grains,
-        planes,
+        walls,
         timestep,
         threads: Threads::Serial,
     }

@@ -4,8 +4,8 @@
 
 use crate::DENSITY;
 use colluvium_dem::{
-    ContactLaw, Domain, Grain, GrainSample, Hooke, Laws, Partner, Plane, Setup, SetupError,
-    Simulation, Snapshot, TangentialSpring, Threads, timestep,
+    ContactLaw, Domain, Grain, GrainSample, Hooke, Laws, Partner, Setup, SetupError, Simulation,
+    Snapshot, TangentialSpring, Threads, Wall, timestep,
 };
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
@@ -74,10 +74,12 @@ impl Column {
     /// If the column cannot be set up.
     pub fn fill(&self) -> Result<Simulation, SetupError> {
         let edge = self.edge;
-        let wall = |point: [f64; 2], normal: [f64; 2]| Plane {
-            point: Vector3::new(point[0], point[1], 0.0),
-            normal: Vector3::new(normal[0], normal[1], 0.0),
-            material: 1,
+        let wall = |point: [f64; 2], normal: [f64; 2]| {
+            Wall::plane(
+                Vector3::new(point[0], point[1], 0.0),
+                Vector3::new(normal[0], normal[1], 0.0),
+            )
+            .material(1)
         };
         let across = (edge / 0.9).round() as usize;
         let cell = edge / across as f64;
@@ -106,7 +108,7 @@ impl Column {
                 pairs: vec![(0, 1, round(self.wall_friction))],
             },
             grains,
-            planes: vec![
+            walls: vec![
                 wall([0.0, 0.0], [1.0, 0.0]),
                 wall([edge, 0.0], [-1.0, 0.0]),
                 wall([0.0, 0.0], [0.0, 1.0]),
@@ -150,7 +152,7 @@ impl Loads {
         for c in &snapshot.contacts {
             let g = &snapshot.grains[c.grain];
             match c.partner {
-                Partner::Plane(_) => {
+                Partner::Wall(_) => {
                     add(g.position.z, 1, c.force.z);
                     add(g.position.z, 2, c.force.xy().norm());
                 }
@@ -292,7 +294,7 @@ impl Hopper {
             gravity: -Vector3::z(),
             law: round(0.5).into(),
             grains: self.bottom().chain(grains).collect(),
-            planes: vec![],
+            walls: vec![],
             timestep: step(),
             threads: Threads::Serial,
         })?;

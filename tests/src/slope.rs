@@ -118,7 +118,7 @@ pub fn rests(bed: &Bed, law: ContactLaw, slope: f64) -> Result<bool, SetupError>
         gravity: Vector3::new(s, 0.0, -c),
         law: law.into(),
         grains: bed.grains.clone(),
-        planes: vec![],
+        walls: vec![],
         timestep: timestep::step(1.0, STIFFNESS, STEPS),
         threads: Threads::Serial,
     })?;

@@ -18,15 +18,11 @@ fn uniform(seed: u64) -> impl FnMut() -> f64 {
     }
 }
 
-fn floor() -> Vec<Plane> {
-    vec![Plane {
-        point: Vector3::zeros(),
-        normal: Vector3::z(),
-        material: 0,
-    }]
+fn floor() -> Vec<Wall> {
+    vec![Wall::plane(Vector3::zeros(), Vector3::z())]
 }
 
-fn setup(law: impl Into<Laws>, grains: Vec<Grain>, planes: Vec<Plane>, gravity: f64) -> Setup {
+fn setup(law: impl Into<Laws>, grains: Vec<Grain>, walls: Vec<Wall>, gravity: f64) -> Setup {
     let reach = grains
         .iter()
         .map(|g| g.position.norm() + 4.0 * g.radius)
@@ -40,7 +36,7 @@ fn setup(law: impl Into<Laws>, grains: Vec<Grain>, planes: Vec<Plane>, gravity: 
         gravity: Vector3::new(0.0, 0.0, -gravity),
         law: law.into(),
         grains,
-        planes,
+        walls,
         timestep: 1.0,
         threads: Threads::Serial,
     }
@@ -335,7 +331,7 @@ fn a_column_a_thousand_high_rests_on_the_sum_of_its_weights() {
         let a = snapshot.grains[c.grain].id;
         match c.partner {
             Partner::Grain(b) => a.max(snapshot.grains[b].id),
-            Partner::Plane(_) => 0,
+            Partner::Wall(_) => 0,
         }
     };
     for contact in &snapshot.contacts {

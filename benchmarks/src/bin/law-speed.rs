@@ -148,7 +148,7 @@ fn setup(law: &Laws) -> Result<Setup, Box<dyn Error>> {
         gravity: Vector3::new(slope.sin(), 0.0, -slope.cos()),
         law: law.clone(),
         grains,
-        planes: Vec::new(),
+        walls: Vec::new(),
         timestep: 1e-4,
         threads: Threads::Serial,
     })

@@ -5,8 +5,8 @@ use super::machine::processor_time;
 use colluvium_dem::contact::mindlin::SpringMemory;
 use colluvium_dem::contact::{Damping, Elasticity, Mindlin, SpringStiffness, Tangential};
 use colluvium_dem::{
-    ContactLaw, Diverged, Domain, Hooke, Lever, Plane, Setup, SetupError, Simulation, Snapshot,
-    TangentialSpring, Threads,
+    ContactLaw, Diverged, Domain, Hooke, Lever, Setup, SetupError, Simulation, Snapshot,
+    TangentialSpring, Threads, Wall,
 };
 use nalgebra::Vector3;
 use std::time::Instant;
@@ -87,14 +87,10 @@ fn law(case: &Case) -> ContactLaw {
 }
 
 fn setup(case: &Case, timestep: f64, threads: Threads) -> Setup {
-    let planes = case.walls.iter().map(|wall| {
+    let walls = case.walls.iter().map(|wall| {
         let mut normal = Vector3::zeros();
         normal[wall.axis] = if wall.grains_above { 1.0 } else { -1.0 };
-        Plane {
-            point: normal.abs() * wall.position,
-            normal,
-            material: 0,
-        }
+        Wall::plane(normal.abs() * wall.position, normal)
     });
     Setup {
         domain: Domain {
@@ -105,7 +101,7 @@ fn setup(case: &Case, timestep: f64, threads: Threads) -> Setup {
         gravity: case.gravity.into(),
         law: law(case).into(),
         grains: case.grains.clone(),
-        planes: planes.collect(),
+        walls: walls.collect(),
         timestep,
         threads,
     }

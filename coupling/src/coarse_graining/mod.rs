@@ -6,7 +6,7 @@
 //! - contact stress σᶜ = Σ f ⊗ a ∫₀¹ W(z − zᵢ − s a_z) ds over each free grain and each of its contacts, with
 //!   the force f on the grain and the arm a from its centre to the contact point, so each pair is split at
 //!   its contact point; bonds count like contacts;
-//! - wall force t = Σ f W(z − z_c) at contacts with fixed grains and planes;
+//! - wall force t = Σ f W(z − z_c) at contacts with fixed grains and walls;
 //! - kinetic stress σᵏ = −⟨ρ u′u′⟩, temperature T = tr⟨u′u′⟩/3.
 //!
 //! Then ∂ₜj + ∇·(ρ u u) = ∇·σ + t + ρ g holds at any instant, kernel and height, by construction.

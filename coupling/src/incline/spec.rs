@@ -222,7 +222,7 @@ impl InclineSpec {
             gravity: self.gravity * Vector3::new(self.slope.sin(), 0.0, -self.slope.cos()),
             law: self.law.into(),
             grains,
-            planes: Vec::new(),
+            walls: Vec::new(),
             timestep: self.timestep,
             threads: self.threads,
         }

@@ -7,10 +7,10 @@ use super::RadiusLaw;
 use crate::contact::ContactLaw;
 use crate::domain::Domain;
 use crate::grains::Grain;
-use crate::planes::Plane;
 use crate::setup::{Setup, SetupError, Threads, check};
 use crate::simulation::Simulation;
 use crate::snapshot::Snapshot;
+use crate::walls::Wall;
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -94,17 +94,13 @@ pub fn settle_incline_bed(
     let diameter = 2.0 * spec.radius.mean();
     let time_unit = (diameter / spec.gravity).sqrt();
     let (domain, cloud) = loose_cloud(spec, time_unit);
-    let floor = Plane {
-        point: Vector3::zeros(),
-        normal: Vector3::z(),
-        material: 0,
-    };
+    let floor = Wall::plane(Vector3::zeros(), Vector3::z());
     let mut simulation = Simulation::new(Setup {
         domain,
         gravity: Vector3::new(0.0, 0.0, -spec.gravity),
         law: spec.law.into(),
         grains: cloud,
-        planes: vec![floor],
+        walls: vec![floor],
         timestep: spec.timestep,
         threads,
     })?;

@@ -109,11 +109,7 @@ pub fn setup(law: ContactLaw, grains: usize, timestep: f64) -> Setup {
         gravity: Vector3::new(2.0, 0.0, -9.81),
         law: law.into(),
         grains,
-        planes: vec![Plane {
-            point: Vector3::zeros(),
-            normal: Vector3::z(),
-            material: 0,
-        }],
+        walls: vec![Wall::plane(Vector3::zeros(), Vector3::z())],
         timestep,
         threads: Threads::Serial,
     }

@@ -338,7 +338,7 @@ fn coordination(snapshot: &Snapshot) -> f64 {
             free(contact.grain)
                 + match contact.partner {
                     Partner::Grain(j) => free(j),
-                    Partner::Plane(_) => 0,
+                    Partner::Wall(_) => 0,
                 }
         })
         .sum();

@@ -83,7 +83,7 @@ pub fn prepare(scene: &ChuteScene, threads: Threads) -> Result<Bed, Failure> {
             gravity: scene.gravity * Vector3::new(slope.sin(), 0.0, -slope.cos()),
             law: law.into(),
             grains,
-            planes: Vec::new(),
+            walls: Vec::new(),
             timestep: pace.timestep,
             threads,
         },

@@ -11,8 +11,8 @@ use crate::summary::{Model, Quantity, Summary};
 use crate::table::Table;
 use colluvium_dem::timestep::Conditions;
 use colluvium_dem::{
-    Cohesion, ContactLaw, Damping, Domain, Grain, GrainSample, Normal, Plane, Record, Setup,
-    SetupError, ShapeParameter, Simulation, Snapshot, Threads,
+    Cohesion, ContactLaw, Damping, Domain, Grain, GrainSample, Normal, Record, Setup, SetupError,
+    ShapeParameter, Simulation, Snapshot, Threads, Wall,
 };
 use nalgebra::Vector3;
 
@@ -147,15 +147,11 @@ pub fn prepare(scene: &ImpactScene, pair: bool) -> Result<Impact, SceneError> {
     moving.velocity = Vector3::new(tangential, 0.0, -normal);
     moving.spin = Vector3::new(0.0, scene.spin, 0.0);
     let mut grains = vec![moving];
-    let mut planes = Vec::new();
+    let mut walls = Vec::new();
     if pair {
         grains.push(Grain::at_rest(Vector3::zeros(), radius, scene.density));
     } else {
-        planes.push(Plane {
-            point: Vector3::zeros(),
-            normal: Vector3::z(),
-            material: 0,
-        });
+        walls.push(Wall::plane(Vector3::zeros(), Vector3::z()));
     }
     let duration = if scene.duration > 0.0 {
         scene.duration
@@ -188,7 +184,7 @@ pub fn prepare(scene: &ImpactScene, pair: bool) -> Result<Impact, SceneError> {
             gravity: Vector3::new(0.0, 0.0, -scene.gravity),
             law: law.into(),
             grains,
-            planes,
+            walls,
             timestep: step.seconds,
             threads: Threads::Serial,
         },
@@ -497,7 +493,7 @@ fn describe(
         summary.ledger.momentum_relative = Some(drift.norm() / initial.norm());
     }
     // Gravity has a moment about the origin: its angular momentum is not kept.
-    if scene.gravity == 0.0 && impact.setup.planes.is_empty() {
+    if scene.gravity == 0.0 && impact.setup.walls.is_empty() {
         summary.ledger.angular_momentum_relative = angular_momentum_error(impact, watch);
     }
 }

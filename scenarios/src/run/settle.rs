@@ -5,7 +5,7 @@ use super::{Findings, Under};
 use crate::failure::Failure;
 use crate::scene::{Scene, SettleScene};
 use colluvium_dem::preparation::RadiusLaw;
-use colluvium_dem::{Domain, Grain, Plane, Setup, Threads};
+use colluvium_dem::{Domain, Grain, Setup, Threads, Wall};
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -51,11 +51,7 @@ pub fn prepare(scene: &SettleScene, threads: Threads) -> Result<Bed, Failure> {
         .map(|g| g.position.z + g.radius)
         .fold(0.0, f64::max);
     let fastest = grains.iter().map(|g| g.velocity.norm()).fold(0.0, f64::max);
-    let wall = |point: Vector3<f64>, normal: Vector3<f64>| Plane {
-        point,
-        normal,
-        material: 0,
-    };
+    let wall = |point: Vector3<f64>, normal: Vector3<f64>| Wall::plane(point, normal);
     let (origin, far) = (Vector3::zeros(), Vector3::new(length, width, 0.0));
     Ok(Bed {
         floor: 0.0,
@@ -70,7 +66,7 @@ pub fn prepare(scene: &SettleScene, threads: Threads) -> Result<Bed, Failure> {
             gravity: Vector3::new(0.0, 0.0, -scene.gravity),
             law: law.into(),
             grains,
-            planes: vec![
+            walls: vec![
                 wall(origin, Vector3::z()),
                 wall(origin, Vector3::x()),
                 wall(origin, Vector3::y()),

@@ -1,0 +1,160 @@
+//! A wall during a run: where it is, how it moves, what it carries.
+
+use super::load::{WallImpulse, WallLoad};
+use super::motion::Motion;
+use super::pose::Pose;
+use super::servo::Course;
+use super::shape::Shape;
+use super::{Foot, Wall};
+use crate::domain::Domain;
+use nalgebra::Vector3;
+
+/// A wall and its state.
+#[derive(Clone, Debug)]
+pub(crate) struct Standing {
+    pub wall: Wall,
+    pub pose: Pose,
+    /// Mean velocity of its origin over the last step, and its angular velocity.
+    pub velocity: Vector3<f64>,
+    pub spin: Vector3<f64>,
+    pub course: Course,
+    /// Of the last forces evaluated.
+    pub load: WallLoad,
+    pub impulse: WallImpulse,
+    /// How far any point of its surface that grains may meet has come since grains near it were listed (m).
+    pub travel: f64,
+    /// Distance of the farthest such point from its origin, at least (m).
+    pub extent: f64,
+    upright: bool,
+}
+
+/// A step in time; times are the same bits whenever they are asked for.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Span {
+    from: f64,
+    to: f64,
+    length: f64,
+}
+
+impl Span {
+    /// The step that ends after `steps` steps of this length (s).
+    pub fn ending(steps: u64, length: f64) -> Span {
+        Span {
+            from: (steps as f64 - 1.0) * length,
+            to: steps as f64 * length,
+            length,
+        }
+    }
+}
+
+/// A wall's next step.
+#[derive(Clone, Copy, Debug)]
+pub(crate) struct Stride {
+    pose: Pose,
+    course: Course,
+    pub velocity: Vector3<f64>,
+    pub spin: Vector3<f64>,
+}
+
+impl Standing {
+    /// Puts a wall where it is at the end of a step.
+    pub fn at(wall: Wall, step: Span, course: Course) -> Standing {
+        let pose = wall.motion.pose(&wall.pose, step.to, course.along);
+        let [velocity, spin] = wall.motion.velocity(&wall.pose, step.from, step.to);
+        let mut standing = Standing {
+            upright: pose.is_upright(),
+            wall,
+            pose,
+            velocity,
+            spin,
+            course,
+            load: WallLoad::default(),
+            impulse: WallImpulse::default(),
+            travel: 0.0,
+            extent: f64::INFINITY,
+        };
+        if let Motion::Servo(servo) = &standing.wall.motion {
+            standing.velocity = servo.axis * course.speed;
+        }
+        standing
+    }
+
+    pub fn moves(&self) -> bool {
+        self.wall.motion != Motion::Fixed
+    }
+
+    /// A step under the present load.
+    pub fn stride(&self, step: Span) -> Stride {
+        let (motion, start) = (&self.wall.motion, &self.wall.pose);
+        let mut course = self.course;
+        let [mut velocity, spin] = motion.velocity(start, step.from, step.to);
+        if let Motion::Servo(servo) = motion {
+            course = servo.next(&course, &self.load.force, step.length);
+            velocity = servo.axis * course.speed;
+        }
+        Stride {
+            pose: motion.pose(start, step.to, course.along),
+            course,
+            velocity,
+            spin,
+        }
+    }
+
+    /// Makes a step.
+    pub fn advance(&mut self, step: Span) {
+        if !self.moves() {
+            return;
+        }
+        let next = self.stride(step);
+        let moved = (next.pose.position - self.pose.position).norm();
+        let turned = 2.0 * (0.5 * next.spin.norm() * step.length).sin().abs();
+        self.travel += moved;
+        if turned > 0.0 {
+            self.travel += turned * self.extent;
+        }
+        (self.pose, self.course) = (next.pose, next.course);
+        (self.velocity, self.spin) = (next.velocity, next.spin);
+        self.upright = self.pose.is_upright();
+    }
+
+    /// A centre seen from the wall's origin: its nearest image to a bounded wall.
+    #[inline(always)]
+    pub fn seen(&self, x: &Vector3<f64>, domain: &Domain) -> Vector3<f64> {
+        let apart = x - self.pose.position;
+        match self.wall.shape {
+            // It spans the periodic axes, or is not what a periodic box can hold.
+            Shape::Plane(_) => apart,
+            _ => domain.nearest_image(apart),
+        }
+    }
+
+    /// Foot of a centre seen from the wall's origin, in directions of space.
+    #[inline(always)]
+    pub fn foot(&self, seen: &Vector3<f64>) -> Foot {
+        if self.upright {
+            return self.wall.shape.foot(seen);
+        }
+        let foot = self.wall.shape.foot(&self.pose.inward(seen));
+        Foot {
+            distance: foot.distance,
+            normal: self.pose.outward(&foot.normal),
+        }
+    }
+
+    /// Velocity of the surface at an arm from the wall's origin (m/s).
+    #[inline(always)]
+    pub fn velocity_at(&self, arm: &Vector3<f64>) -> Vector3<f64> {
+        self.velocity + self.spin.cross(arm)
+    }
+}
+
+impl Standing {
+    /// How fast grains that drift at a velocity may near the wall (m/s).
+    #[inline(always)]
+    pub fn drift(&self, drift: &Vector3<f64>) -> f64 {
+        match &self.wall.shape {
+            Shape::Plane(plane) if self.upright => drift.dot(&plane.normal).abs(),
+            _ => drift.norm(),
+        }
+    }
+}

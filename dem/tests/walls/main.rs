@@ -1,0 +1,7 @@
+//! Walls of every shape, at rest and in motion, against closed forms and conservation laws.
+
+#![allow(clippy::unwrap_used)]
+
+mod moving;
+mod scene;
+mod shapes;
