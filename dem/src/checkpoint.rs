@@ -5,7 +5,7 @@
 //! touch have a history.
 
 use crate::contact::HISTORY_MAX;
-use crate::grains::{Grains, Next};
+use crate::grains::Grains;
 use crate::grid::Grid;
 use crate::ledger::EnergyLedger;
 use crate::neighbours::{Level, Row};
@@ -158,7 +158,7 @@ impl Simulation {
                 .iter()
                 .map(|&m| m as u16)
                 .collect(),
-            next: Next::default(),
+            spare: Vec::new(),
         };
         let known = |&m: &u16| usize::from(m) < self.law.materials();
         if grains.material.len() != n || !grains.material.iter().all(known) {

@@ -112,6 +112,7 @@ impl Chunk {
                     self.first_touched.push(kept as u32);
                     grain += 1;
                 }
+                make_room(&mut self.touched, 1);
                 self.touched.push(self.j[place]);
                 kept += 1;
             }
@@ -163,14 +164,6 @@ impl Chunk {
         self.j.clear();
         self.order.clear();
         self.ends.clear();
-        if self.i.capacity() == 0 {
-            // Growing by doubling would leave holes in memory.
-            let partners = |g| making.list.partners(g).len();
-            let listed: usize = self.grains.clone().map(partners).sum();
-            self.i.reserve_exact(listed);
-            self.j.reserve_exact(listed);
-            self.order.reserve_exact(listed);
-        }
         (self.outer, self.widest, self.ring) = (0, 0, 1);
         let (mut next, mut last) = (0, 0);
         for from in self.grains.clone().step_by(BLOCK) {
@@ -227,6 +220,9 @@ impl Chunk {
         let touching = self.listed.iter().filter(|pair| pair.overlaps).count();
         let [mut touching, mut apart] = [first, first + touching];
         let places = self.listed.len().next_multiple_of(WIDEST);
+        make_room(&mut self.i, places);
+        make_room(&mut self.j, places);
+        make_room(&mut self.order, places);
         self.i.resize(first + places, dummy);
         self.j.resize(first + places, dummy);
         for pair in &self.listed {
@@ -255,7 +251,10 @@ impl Chunk {
     /// are never overwritten.
     fn spread(&mut self, width: usize) {
         let (places, start) = (self.i.len(), self.grains.start);
-        self.history.resize(places / 4 * width, [0.0; 4]);
+        let rows = places / 4 * width;
+        let more = rows.saturating_sub(self.history.len());
+        make_room(&mut self.history, more);
+        self.history.resize(rows, [0.0; 4]);
         let mut rest = (places - self.touched.len()) * width;
         let flat = self.history.as_flattened_mut();
         flat.copy_within(..self.touched.len() * width, rest);
@@ -296,6 +295,13 @@ impl Chunk {
     pub fn recall(&mut self) {
         std::mem::swap(&mut self.history, &mut self.before);
         self.lanes.fill(ALL_LANES);
+    }
+}
+
+/// Makes room for so many more: growing by doubling would leave holes in memory.
+fn make_room<T>(values: &mut Vec<T>, more: usize) {
+    if values.capacity() - values.len() < more {
+        values.reserve_exact(more.max(values.len() / 16));
     }
 }
 

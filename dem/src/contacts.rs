@@ -1,6 +1,6 @@
 //! Histories of touching contacts on their way from one list to the next.
 
-use crate::grains::{Grains, Next};
+use crate::grains::Grains;
 use crate::population::GONE;
 use crate::reach::Reach;
 use crate::simulation::Layout;
@@ -8,8 +8,8 @@ use std::ops::Range;
 
 /// Touching contacts by their lower grain.
 ///
-/// They live for a moment only, while no step is being made: in the rows that steps write to, which
-/// are three for each grain. A contact takes a row or two, its partner last.
+/// They live for a moment only, while no step is being made, as far as possible in the spare rows of
+/// the grains. A contact takes a row or more, its partner last.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Touching {
     width: usize,
@@ -17,9 +17,10 @@ pub(crate) struct Touching {
     rows: usize,
     /// Contacts of grain i: `first[i]..first[i + 1]`.
     first: Vec<u32>,
-    /// The borrowed rows, and more where they do not suffice.
-    parts: [Vec<[f64; 4]>; 4],
-    part: usize,
+    /// The borrowed rows.
+    spare: Vec<[f64; 4]>,
+    /// More where they do not suffice.
+    beyond: Vec<[f64; 4]>,
 }
 
 impl Touching {
@@ -32,7 +33,7 @@ impl Touching {
         place: &dyn Fn(u32) -> u32,
     ) {
         let (width, n) = (layout.history, grains.len());
-        self.open(width, n, &mut grains.next);
+        self.open(width, n, &mut grains.spare);
         reach.compact(width);
         reach.compacted(width, |i, j, _| {
             let (i, j) = (place(i), place(j));
@@ -50,13 +51,12 @@ impl Touching {
     }
 
     /// Makes ready for contacts between `n` grains.
-    pub fn open(&mut self, width: usize, n: usize, next: &mut Next) {
+    pub fn open(&mut self, width: usize, n: usize, spare: &mut Vec<[f64; 4]>) {
         self.width = width;
         self.rows = (width + 1).div_ceil(4);
         self.first.clear();
         self.first.resize(n + 2, 0);
-        self.part = n + 1;
-        next.lend(&mut self.parts);
+        std::mem::swap(&mut self.spare, spare);
     }
 
     /// Counts a contact, before any is put down.
@@ -70,8 +70,11 @@ impl Touching {
             self.first[i] += self.first[i - 1];
         }
         let all = self.first.last().map_or(0, |&c| c as usize) * self.rows;
-        let beyond = all.saturating_sub(3 * self.part);
-        self.parts[3].resize(beyond, [0.0; 4]);
+        let beyond = all.saturating_sub(self.spare.len());
+        if beyond > self.beyond.capacity() {
+            self.beyond.reserve_exact(beyond - self.beyond.len());
+        }
+        self.beyond.resize(beyond, [0.0; 4]);
     }
 
     /// Puts down a contact. Where `j < i` it is turned round, and its first `flips` numbers change
@@ -89,14 +92,21 @@ impl Touching {
 
     fn number(&mut self, contact: usize, k: usize) -> &mut f64 {
         let row = contact * self.rows + k / 4;
-        let part = (row / self.part).min(3);
-        &mut self.parts[part][row - part * self.part][k % 4]
+        let spare = self.spare.len();
+        let rows = if row < spare {
+            &mut self.spare[row]
+        } else {
+            &mut self.beyond[row - spare]
+        };
+        &mut rows[k % 4]
     }
 
     fn read(&self, contact: usize, k: usize) -> f64 {
         let row = contact * self.rows + k / 4;
-        let part = (row / self.part).min(3);
-        self.parts[part][row - part * self.part][k % 4]
+        match row.checked_sub(self.spare.len()) {
+            None => self.spare[row][k % 4],
+            Some(beyond) => self.beyond[beyond][k % 4],
+        }
     }
 
     /// Contacts whose lower grain is one of `grains`, all being put down.
@@ -118,7 +128,7 @@ impl Touching {
     }
 
     /// Gives the rows back.
-    pub fn close(&mut self, next: &mut Next) {
-        next.take_back(&mut self.parts);
+    pub fn close(&mut self, spare: &mut Vec<[f64; 4]>) {
+        std::mem::swap(&mut self.spare, spare);
     }
 }

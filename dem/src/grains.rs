@@ -62,35 +62,8 @@ pub(crate) struct Grains {
     pub id: Vec<u32>,
     /// Number of the material.
     pub material: Vec<u16>,
-    /// Rows in the making.
-    pub next: Next,
-}
-
-/// Where a sort writes; room for others between steps.
-#[derive(Clone, Debug, Default)]
-pub(crate) struct Next {
-    pub place: Vec<[f64; 4]>,
-    pub motion: Vec<[f64; 4]>,
-    pub turn: Vec<[f64; 4]>,
-}
-
-impl Next {
-    /// Lends its rows to somebody who needs room between steps.
-    pub fn lend(&mut self, rows: &mut [Vec<[f64; 4]>; 4]) {
-        std::mem::swap(&mut self.place, &mut rows[0]);
-        std::mem::swap(&mut self.motion, &mut rows[1]);
-        std::mem::swap(&mut self.turn, &mut rows[2]);
-    }
-
-    /// Takes them back.
-    pub fn take_back(&mut self, rows: &mut [Vec<[f64; 4]>; 4]) {
-        self.lend(rows);
-        for rows in [&mut self.place, &mut self.motion, &mut self.turn] {
-            if let Some(dummy) = rows.last_mut() {
-                *dummy = [0.0; 4];
-            }
-        }
-    }
+    /// As many rows again: where a sort writes, and room for others between steps.
+    pub spare: Vec<[f64; 4]>,
 }
 
 impl Grains {
@@ -149,13 +122,7 @@ impl Grains {
         self.turn.push([0.0; 4]);
         self.material.push(0);
         let rows = self.place.len();
-        for next in [
-            &mut self.next.place,
-            &mut self.next.motion,
-            &mut self.next.turn,
-        ] {
-            next.resize(rows, [0.0; 4]);
-        }
+        self.spare.resize(rows, [0.0; 4]);
     }
 
     /// Number of real grains.
@@ -169,19 +136,15 @@ impl Grains {
 
     /// Reorders all rows so that new grain `k` is old grain `order(k)`.
     pub fn reorder(&mut self, order: &[u32]) {
-        for (rows, next) in [
-            (&mut self.place, &mut self.next.place),
-            (&mut self.motion, &mut self.next.motion),
-            (&mut self.turn, &mut self.next.turn),
-        ] {
-            next.clear();
-            next.reserve_exact(order.len() + 1);
-            next.extend(order.iter().map(|&o| rows[o as usize]));
-            next.push([0.0; 4]);
-            std::mem::swap(rows, next);
+        for rows in [&mut self.place, &mut self.motion, &mut self.turn] {
+            let spare = &mut self.spare;
+            spare.clear();
+            spare.reserve_exact(order.len() + 1);
+            spare.extend(order.iter().map(|&o| rows[o as usize]));
+            spare.push([0.0; 4]);
+            std::mem::swap(rows, spare);
         }
-        // The rows in the making have room for the narrow arrays.
-        for (room, &o) in self.next.place.iter_mut().zip(order) {
+        for (room, &o) in self.spare.iter_mut().zip(order) {
             *room = [
                 self.mass[o as usize],
                 f64::from(self.id[o as usize]),
@@ -191,7 +154,7 @@ impl Grains {
         }
         let ordered = self.mass.iter_mut().zip(&mut self.id);
         let ordered = ordered.zip(&mut self.material);
-        for (((mass, id), material), room) in ordered.zip(&self.next.place) {
+        for (((mass, id), material), room) in ordered.zip(&self.spare) {
             (*mass, *id, *material) = (room[0], room[1] as u32, room[2] as u16);
         }
     }

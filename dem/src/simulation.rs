@@ -604,7 +604,7 @@ impl Simulation {
         };
         if cut {
             self.reach.cut(&making, &self.touching, self.parallel);
-            self.touching.close(&mut self.grains.next);
+            self.touching.close(&mut self.grains.spare);
         } else {
             self.reach.renew(&making);
         }
@@ -615,7 +615,7 @@ impl Simulation {
     pub(crate) fn take_histories(&mut self, pairs: &[[u32; 2]], histories: &[f64]) {
         let (width, flips) = (self.layout.history, self.layout.flips);
         self.touching
-            .open(width, self.grains.len(), &mut self.grains.next);
+            .open(width, self.grains.len(), &mut self.grains.spare);
         for &[i, j] in pairs {
             self.touching.count(i, j);
         }
