@@ -115,6 +115,7 @@ impl Simulation {
         );
         self.loads.record(&mut record);
         self.bonds.record(&mut record);
+        self.fields.record(&mut record);
         record
     }
 
@@ -246,6 +247,7 @@ impl Simulation {
         self.list.restore(levels);
         self.loads.read(record, &grains)?;
         self.bonds.read(record, &grains)?;
+        self.fields.read(record)?;
         self.grains = grains;
         self.weigh();
 

@@ -23,6 +23,9 @@ pub struct Energy {
     /// Bonds.
     #[serde(default)]
     pub bonds: f64,
+    /// Potential energy in fields that differ from place to place; uniform gravity has none here.
+    #[serde(default)]
+    pub potential: f64,
 }
 
 impl Energy {
@@ -36,8 +39,8 @@ impl Energy {
         self.normal + self.cohesion + self.tangential + self.rolling + self.twisting + self.bonds
     }
 
-    /// Kinetic and elastic energy (J).
+    /// Kinetic, elastic and potential energy (J).
     pub fn total(&self) -> f64 {
-        self.kinetic() + self.elastic()
+        self.kinetic() + self.elastic() + self.potential
     }
 }

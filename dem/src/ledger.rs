@@ -5,7 +5,7 @@
 //! moved grains and walls adds up to the kinetic energy *to round-off*, at any time step:
 //!
 //! ```text
-//! K(now) = K(start) + Σ W_channel + W_gravity + W_drive + W_loads + W_bonds
+//! K(now) = K(start) + Σ W_channel + W_gravity + W_drive + W_loads + W_bonds + W_fields
 //! dissipated by a channel = -W_channel - (E_channel(now) - E_channel(start))
 //! ```
 //! E_channel is the energy that the law says its springs hold, so a channel that dissipates less than
@@ -77,6 +77,24 @@ impl Bonding {
     }
 }
 
+/// Energy by way of fields of gravity that differ from place to place (J).
+#[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
+pub struct Falling {
+    /// Work on grains since the ledger was opened.
+    pub work: f64,
+    /// Potential energy when it was opened.
+    pub potential_before: f64,
+    /// Potential energy now.
+    pub potential: f64,
+}
+
+impl Falling {
+    /// What has come out of nowhere (J): the error of the step and of the tree.
+    pub fn gained(&self) -> f64 {
+        self.work + (self.potential - self.potential_before)
+    }
+}
+
 /// What has happened to the energy of the free grains since the ledger was opened (J).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct EnergyLedger {
@@ -96,6 +114,9 @@ pub struct EnergyLedger {
     /// Work of bonds on grains.
     #[serde(default)]
     pub bonds: Bonding,
+    /// Work of fields of gravity.
+    #[serde(default)]
+    pub fields: Falling,
     /// Energy in contacts when it was opened.
     pub stored_before: Channels,
     /// Energy in contacts now.
@@ -117,7 +138,12 @@ impl EnergyLedger {
 
     /// What is not accounted for, relative to the largest entry: round-off.
     pub fn error(&self) -> f64 {
-        let put_in = self.work.sum() + self.gravity + self.drive + self.loads + self.bonds.work;
+        let put_in = self.work.sum()
+            + self.gravity
+            + self.drive
+            + self.loads
+            + self.bonds.work
+            + self.fields.work;
         let entries = [
             self.kinetic_before,
             self.kinetic,
@@ -128,6 +154,7 @@ impl EnergyLedger {
             self.drive,
             self.loads,
             self.bonds.work,
+            self.fields.work,
         ];
         let scale = entries.iter().fold(0.0_f64, |a, e| a.max(e.abs()));
         if scale > 0.0 {
@@ -141,12 +168,13 @@ impl EnergyLedger {
 impl EnergyLedger {
     /// All entries, for a checkpoint.
     pub(crate) fn numbers(&self) -> Vec<f64> {
-        let bonds = &self.bonds;
+        let (bonds, fields) = (&self.bonds, &self.fields);
         let channels = |c: &Channels| [c.normal, c.tangential, c.rolling, c.twisting];
         [
             [self.kinetic_before, self.kinetic, self.gravity, self.drive],
             [self.loads, bonds.work, bonds.stored_before, bonds.stored],
             [bonds.freed_before, bonds.freed, 0.0, 0.0],
+            [fields.work, fields.potential_before, fields.potential, 0.0],
             channels(&self.work),
             channels(&self.stored_before),
             channels(&self.stored),
@@ -159,13 +187,15 @@ impl EnergyLedger {
         if numbers.is_empty() {
             return Ok(None);
         }
-        let (&[first, second, third, work, stored_before, stored], []) = numbers.as_chunks::<4>()
+        let (&[first, second, third, fourth, work, stored_before, stored], []) =
+            numbers.as_chunks::<4>()
         else {
-            return Err("array `energy_ledger` must have 24 numbers".into());
+            return Err("array `energy_ledger` must have 28 numbers".into());
         };
         let [kinetic_before, kinetic, gravity, drive] = first;
         let [loads, bond_work, before, now] = second;
         let [freed_before, freed, ..] = third;
+        let [field_work, potential_before, potential, _] = fourth;
         let channels = |[normal, tangential, rolling, twisting]: [f64; 4]| Channels {
             normal,
             tangential,
@@ -185,6 +215,11 @@ impl EnergyLedger {
                 stored: now,
                 freed_before,
                 freed,
+            },
+            fields: Falling {
+                work: field_work,
+                potential_before,
+                potential,
             },
             stored_before: channels(stored_before),
             stored: channels(stored),
@@ -208,7 +243,13 @@ impl Simulation {
         let kinetic = self.energy().kinetic();
         let stored = self.stored_energy();
         let (bonded, freed) = (self.bond_energy(), self.bonds.count().energy_freed);
+        let potential = self.fields.potential();
         self.ledger = Some(EnergyLedger {
+            fields: Falling {
+                work: 0.0,
+                potential_before: potential,
+                potential,
+            },
             bonds: Bonding {
                 work: 0.0,
                 stored_before: bonded,
@@ -241,6 +282,7 @@ impl Simulation {
         let mut ledger = self.ledger.replace(before)?;
         ledger.kinetic = self.energy().kinetic();
         ledger.stored = Channels::of(&stored);
+        ledger.fields.potential = self.fields.potential();
         ledger.bonds.stored = self.bond_energy();
         ledger.bonds.freed = self.bonds.count().energy_freed;
         Some(ledger)
@@ -316,6 +358,11 @@ impl Simulation {
                             .map_or(0.0, |m| sign * vector(m).dot(&side.spin));
                     ledger.drive -= kick * power;
                 }
+            }
+        }
+        for (grain, pull) in moving.iter().zip(&self.fields.pulls) {
+            if !grain.fixed {
+                ledger.fields.work += kick * vector(pull).dot(&grain.velocity);
             }
         }
         for Bond { rows, pull, .. } in self.bonds.whole() {

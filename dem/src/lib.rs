@@ -17,6 +17,7 @@ mod domain;
 mod energy;
 mod forces;
 mod grains;
+mod gravity;
 mod grid;
 mod lanes;
 mod ledger;
@@ -52,7 +53,8 @@ pub use contact::{
 pub use domain::Domain;
 pub use energy::Energy;
 pub use grains::Grain;
-pub use ledger::{Bonding, Channels, EnergyLedger};
+pub use gravity::{GRAVITATION, HeavySphere, Schedule, SelfGravity, TreeError};
+pub use ledger::{Bonding, Channels, EnergyLedger, Falling};
 pub use loads::Load;
 pub use record::Record;
 pub use region::Region;

@@ -9,7 +9,7 @@
 //! Rows exist only where a scene has loads, so that others pay one comparison a grain.
 
 use crate::bonds::{Bond, Bonds};
-use crate::grains::Grains;
+use crate::grains::{Grains, vector};
 use crate::places::Places;
 use crate::population::GONE;
 use crate::record::Record;
@@ -72,6 +72,15 @@ impl Loads {
                 add(&mut self.rows[at], &load.force, &load.moment);
                 self.external += load.force;
             }
+        }
+    }
+
+    /// Adds what fields of gravity do.
+    fn add_fields(&mut self, pulls: &[[f64; 4]]) {
+        for (row, pull) in self.rows.iter_mut().zip(pulls) {
+            let force = vector(pull);
+            add(row, &force, &Vector3::zeros());
+            self.external += force;
         }
     }
 
@@ -146,12 +155,16 @@ impl Simulation {
     /// Lays the loads of the present positions; bonds stretch by a step of this length (s).
     pub(crate) fn evaluate_loads(&mut self, stretch: f64) {
         let grains = &self.grains;
-        if !self.looks_up() {
+        if !self.looks_up() && !self.fields.has_fields() {
             self.loads.clear(0);
             return;
         }
         self.loads.clear(grains.len());
         self.loads.add_given(grains);
+        if self.fields.has_fields() {
+            self.fields.evaluate(grains, self.parallel);
+            self.loads.add_fields(&self.fields.pulls);
+        }
         self.bonds
             .evaluate(grains, &self.domain, stretch, self.parallel);
         self.loads.add_bonds(&self.bonds);

@@ -147,6 +147,7 @@ impl Simulation {
             );
         }
         energy.bonds = self.bond_energy();
+        energy.potential = self.fields.potential();
         energy
     }
 

@@ -7,6 +7,7 @@ use crate::contacts::Touching;
 use crate::domain::{Domain, Images};
 use crate::forces::{self, Field};
 use crate::grains::{Grains, vector};
+use crate::gravity::Gravity;
 use crate::lanes::Width;
 use crate::ledger::EnergyLedger;
 use crate::loads::Loads;
@@ -148,6 +149,7 @@ pub struct Simulation {
     pub(crate) wall_contacts: WallContacts,
     pub(crate) loads: Loads,
     pub(crate) bonds: Bonds,
+    pub(crate) fields: Gravity,
     /// Rows by grain number, as of the last build of lists with loads.
     pub(crate) places: Places,
     /// Histories on their way to new lists.
@@ -244,6 +246,7 @@ impl Simulation {
             wall_contacts: WallContacts::default(),
             loads: Loads::default(),
             bonds: Bonds::default(),
+            fields: Gravity::default(),
             places: Places::default(),
             touching: Touching::default(),
             fastest: Vec::new(),
@@ -298,6 +301,7 @@ impl Simulation {
         self.keep_accounts(kick);
         self.steps += 1;
         self.steps_since_start += 1;
+        self.follow_schedule();
         self.current = false;
         self.springs_current = false;
         self.keep_lists()
@@ -723,8 +727,9 @@ impl Simulation {
         self.gravity
     }
 
-    /// Changes gravity from the next step on.
+    /// Changes gravity from the next step on; a schedule ends.
     pub fn set_gravity(&mut self, gravity: Vector3<f64>) {
+        self.fields.schedule = None;
         self.gravity = gravity;
     }
 
