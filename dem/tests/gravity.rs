@@ -21,7 +21,7 @@ fn space(grains: Vec<Grain>, timestep: f64, threads: Threads) -> Setup {
         gravity: Vector3::zeros(),
         law: laws()[0].1.into(),
         grains,
-        planes: Vec::new(),
+        walls: Vec::new(),
         timestep,
         threads,
     }
@@ -135,7 +135,7 @@ fn two_clumps_close_their_orbit_by_the_tree() {
     assert!(off < 2e-3, "{off:e}");
     // What is left of it comes from their shapes, not from the tree.
     let (direct, error) = clumps(0.0);
-    assert_eq!(error.rms, 0.0);
+    assert!(error.rms < 1e-13, "{error:?}");
     assert!((direct - off).abs() < 1e-3, "{direct:e} {off:e}");
 }
 
