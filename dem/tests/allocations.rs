@@ -3,10 +3,12 @@
 #![allow(clippy::unwrap_used)]
 
 use colluvium_dem::preparation::{Bed, InclineBed, RadiusLaw, settle_incline_bed};
+use colluvium_dem::walls::{Mesh, Sine};
 use colluvium_dem::*;
 use nalgebra::Vector3;
 use std::alloc::{GlobalAlloc, Layout, System};
 use std::ops::ControlFlow;
+use std::sync::Arc;
 use std::sync::atomic::{AtomicU64, Ordering};
 
 struct Counting;
@@ -34,7 +36,7 @@ unsafe impl GlobalAlloc for Counting {
 #[global_allocator]
 static COUNTING: Counting = Counting;
 
-fn flow(threads: Threads) -> Simulation {
+fn flow(threads: Threads, floor: impl Fn(f64) -> Wall) -> Simulation {
     let law = ContactLaw::linear(
         Hooke::matched(2e4, 0.5),
         TangentialSpring::matched(2.0 / 7.0, 0.5, 0.5),
@@ -63,16 +65,41 @@ fn flow(threads: Threads) -> Simulation {
         gravity: Vector3::new(slope.sin(), 0.0, -slope.cos()),
         law: law.into(),
         grains: bed.grains,
-        walls: vec![Wall::plane(
-            Vector3::new(0.0, 0.0, bed.domain.lower.z),
-            Vector3::z(),
-        )],
+        walls: vec![floor(bed.domain.lower.z)],
         timestep: 5e-4,
         threads,
     })
     .unwrap();
     s.give_velocity(|g| Vector3::new(1.2 * g.position.z, 0.0, 0.0));
     s
+}
+
+fn plane(height: f64) -> Wall {
+    Wall::plane(Vector3::z() * height, Vector3::z())
+}
+
+/// A floor of triangles under the whole box, that shakes.
+fn mesh(height: f64) -> Wall {
+    let across: u32 = 12;
+    let vertices = (0..(across + 1) * (across + 1)).map(|k| {
+        let [x, y] = [k % (across + 1), k / (across + 1)].map(f64::from);
+        Vector3::new(x, y * 10.0 / 12.0, height)
+    });
+    let cells = (0..across * across).map(|k| k / across * (across + 1) + k % across);
+    let triangles: Vec<[u32; 3]> = cells
+        .flat_map(|k| {
+            [
+                [k, k + 1, k + across + 1],
+                [k + 1, k + across + 2, k + across + 1],
+            ]
+        })
+        .collect();
+    let mesh = Mesh::new(vertices.collect(), &triangles).unwrap();
+    Wall::mesh(Arc::new(mesh)).moving(Motion::Sine(Sine {
+        amplitude: Vector3::z() * 0.01,
+        frequency: Vector3::z(),
+        phase: Vector3::zeros(),
+    }))
 }
 
 /// Allocations of a few steps without a rebuild, and of many with rebuilds.
@@ -93,9 +120,9 @@ fn count(s: &mut Simulation) -> (u64, u64, u64) {
 
 #[test]
 fn steps_allocate_nothing() {
-    let (quiet, busy, builds) = count(&mut flow(Threads::Serial));
+    let (quiet, busy, builds) = count(&mut flow(Threads::Serial, plane));
     println!("serial: {quiet} a step, {busy} over {builds} rebuilds");
-    let mut parallel = flow(Threads::Rayon);
+    let mut parallel = flow(Threads::Rayon, plane);
     let (quiet_threads, busy_threads, _) = rayon::ThreadPoolBuilder::new()
         .num_threads(2)
         .build()
@@ -107,4 +134,9 @@ fn steps_allocate_nothing() {
     // A buffer grows now and then, when a list is longer than any before it.
     assert!(busy < 2 * builds, "{busy}");
     assert!(busy_threads < 2 * builds, "{busy_threads}");
+    // One test: the counter sees all threads of the process.
+    let (quiet, busy, builds) = count(&mut flow(Threads::Serial, mesh));
+    println!("on a mesh: {quiet} a step, {busy} over {builds} rebuilds");
+    assert_eq!(quiet, 0);
+    assert!(busy < 2 * builds, "{busy}");
 }

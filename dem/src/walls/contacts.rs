@@ -4,19 +4,23 @@
 //! have used up the room that unlisted grains had; it may be made at any time without changing a bit, since
 //! contacts that do not touch leave zeros. Steps cost only for grains that are listed.
 
-use super::Standing;
+use super::mesh::{CONTACTS, Mesh, Offers};
+use super::{Foot, Shape, Standing};
 use crate::contact::{HISTORY_MAX, Interaction, Lever, Step, Touch};
 use crate::domain::Domain;
 use crate::grains::{Grains, vector};
 use crate::lanes::Vec3;
 use crate::neighbours::Row;
 use nalgebra::Vector3;
+use std::ops::Range;
 
 /// A grain near a wall.
 #[derive(Clone, Copy, Debug)]
 pub(crate) struct WallContact {
     pub grain: u32,
     pub wall: u32,
+    /// Number of the block of contacts with a mesh that it is one of, or none.
+    pub block: u32,
     pub history: [f64; HISTORY_MAX],
     /// Force, moment of the tangential force, further moment on the grain.
     pub slot: [[f64; 4]; 3],
@@ -32,6 +36,7 @@ impl WallContact {
         WallContact {
             grain,
             wall,
+            block: ALONE,
             history: [0.0; HISTORY_MAX],
             slot: [[0.0; 4]; 3],
             touching: false,
@@ -41,12 +46,35 @@ impl WallContact {
     }
 
     fn part(&mut self) {
-        *self = WallContact::apart(self.grain, self.wall);
+        *self = WallContact {
+            block: self.block,
+            ..WallContact::apart(self.grain, self.wall)
+        };
     }
 
     fn key(&self) -> (u32, u32) {
         (self.grain, self.wall)
     }
+}
+
+/// The block of a contact with a wall that is no mesh.
+const ALONE: u32 = u32::MAX;
+
+/// Cosine of the angle by which the normal of a contact with a mesh may turn in a step.
+const SAME: f64 = 0.5;
+
+/// A triangle near a grain, seen from the grain's image that is moved by `shift`.
+#[derive(Clone, Copy, Debug)]
+struct Near {
+    triangle: u32,
+    shift: Vector3<f64>,
+}
+
+/// All contacts that a grain may have with a mesh: those that touch come first, the nearest first.
+#[derive(Clone, Debug)]
+struct Block {
+    contacts: Range<usize>,
+    near: Range<usize>,
 }
 
 /// Overlap, over the radius, at which a contact with a plate cannot begin: the grain was pressed through
@@ -67,8 +95,7 @@ struct Meeting {
     grain: usize,
     /// Centre, from the wall's origin.
     seen: Vector3<f64>,
-    distance: f64,
-    normal: Vector3<f64>,
+    foot: Foot,
 }
 
 /// How long a list has lasted: travel of rows and time since the pairs were listed.
@@ -90,6 +117,8 @@ pub(crate) struct WallContacts {
     /// Travel of each row, and time, since the pairs were listed, when this list was made.
     travel_then: Vec<f64>,
     time_then: f64,
+    blocks: Vec<Block>,
+    near: Vec<Near>,
     old: Vec<WallContact>,
     /// Contacts as they were before they were looked at out of turn.
     before: Vec<WallContact>,
@@ -151,6 +180,8 @@ impl WallContacts {
         age: Age,
     ) {
         self.contacts.clear();
+        self.blocks.clear();
+        self.near.clear();
         self.first.clear();
         self.clearance.clear();
         if walls.is_empty() {
@@ -163,18 +194,13 @@ impl WallContacts {
             for g in row.start..row.end {
                 let x = &grains.place[g as usize];
                 for (w, wall) in walls.iter().enumerate() {
-                    let gap = wall.foot(&wall.seen(&vector(x), domain)).distance - x[3];
-                    if gap >= skin {
-                        let nearest = &mut self.clearance[from + w];
-                        *nearest = nearest.min(gap);
-                        continue;
-                    }
                     let key = (g, w as u32);
-                    let known = self.old.binary_search_by_key(&key, WallContact::key);
-                    self.contacts.push(match known {
-                        Ok(known) => self.old[known],
-                        Err(_) => WallContact::apart(g, w as u32),
-                    });
+                    let free = match &wall.wall.shape {
+                        Shape::Mesh(mesh) => self.list_mesh(key, mesh, wall, x, domain, skin),
+                        _ => self.list_alone(key, wall, x, domain, skin),
+                    };
+                    let nearest = &mut self.clearance[from + w];
+                    *nearest = nearest.min(free);
                 }
                 self.first.push(self.contacts.len() as u32);
             }
@@ -185,6 +211,70 @@ impl WallContacts {
         for wall in walls {
             start_travel(wall, grains, domain, skin);
         }
+    }
+
+    /// Lists a grain near a wall that it can touch once; how near unlisted surfaces are (m).
+    fn list_alone(
+        &mut self,
+        (g, w): (u32, u32),
+        wall: &Standing,
+        x: &[f64; 4],
+        domain: &Domain,
+        skin: f64,
+    ) -> f64 {
+        let gap = wall.foot(&wall.seen(&vector(x), domain)).distance - x[3];
+        if gap >= skin {
+            return gap;
+        }
+        let known = self.old.binary_search_by_key(&(g, w), WallContact::key);
+        self.contacts.push(match known {
+            Ok(known) => self.old[known],
+            Err(_) => WallContact::apart(g, w),
+        });
+        f64::INFINITY
+    }
+
+    /// Lists a grain near a mesh, with the triangles near it; how near unlisted triangles are (m).
+    fn list_mesh(
+        &mut self,
+        (g, w): (u32, u32),
+        mesh: &Mesh,
+        wall: &Standing,
+        x: &[f64; 4],
+        domain: &Domain,
+        skin: f64,
+    ) -> f64 {
+        let (from, reach) = (self.near.len(), x[3] + skin);
+        let near = &mut self.near;
+        let far = wall.images_near(mesh, &vector(x), reach, domain, |shift, centre| {
+            mesh.near(centre, reach, |triangle| {
+                near.push(Near { triangle, shift })
+            });
+        });
+        if near.len() == from {
+            return skin.max(far - x[3]);
+        }
+        // The order that the tree finds them in must not matter.
+        near[from..].sort_unstable_by(|a, b| {
+            let shifts = || a.shift.iter().zip(b.shift.iter());
+            let order = a.triangle.cmp(&b.triangle);
+            shifts().fold(order, |order, (a, b)| order.then(a.total_cmp(b)))
+        });
+        let rows = (near.len() - from).min(CONTACTS);
+        let known = self.old.partition_point(|c| c.key() < (g, w));
+        let mut known = self.old[known..].iter().filter(|c| c.key() == (g, w));
+        let first = self.contacts.len();
+        let block = self.blocks.len() as u32;
+        for _ in 0..rows {
+            let known = known.next().copied();
+            let contact = known.unwrap_or_else(|| WallContact::apart(g, w));
+            self.contacts.push(WallContact { block, ..contact });
+        }
+        self.blocks.push(Block {
+            contacts: first..first + rows,
+            near: from..self.near.len(),
+        });
+        skin
     }
 
     /// Whether an unlisted grain may have reached a wall.
@@ -215,22 +305,96 @@ impl WallContacts {
         for wall in walls.iter_mut() {
             wall.load = Default::default();
         }
-        let mut deepest: f64 = 0.0;
-        for c in &mut self.contacts {
+        let (mut deepest, mut k): (f64, usize) = (0.0, 0);
+        while let Some(c) = self.contacts.get_mut(k) {
+            if c.block != ALONE {
+                let block = &self.blocks[c.block as usize];
+                let rows = &mut self.contacts[block.contacts.clone()];
+                let near = &self.near[block.near.clone()];
+                deepest = deepest.max(meet_mesh(rows, near, law, walls, scene));
+                k = block.contacts.end;
+                continue;
+            }
             let (grain, wall) = (c.grain as usize, &mut walls[c.wall as usize]);
             let x = &scene.grains.place[grain];
             let seen = wall.seen(&vector(x), scene.domain);
             let foot = wall.foot(&seen);
-            let meeting = Meeting {
-                grain,
-                seen,
-                distance: foot.distance,
-                normal: foot.normal,
-            };
+            let meeting = Meeting { grain, seen, foot };
             deepest = deepest.max(c.evaluate(law, wall, &meeting, scene));
+            k += 1;
         }
         deepest
     }
+}
+
+/// Evaluates the contacts of a grain with a mesh; the largest overlap over the radius.
+///
+/// Histories go on where a contact's normal has turned least since the last step: from face to edge to face
+/// there is one contact, whatever triangles it is with.
+fn meet_mesh<I: Interaction>(
+    rows: &mut [WallContact],
+    near: &[Near],
+    law: &I,
+    walls: &mut [Standing],
+    scene: &Scene,
+) -> f64 {
+    let (g, wall) = (rows[0].grain, &mut walls[rows[0].wall as usize]);
+    let grain = g as usize;
+    let x = &scene.grains.place[grain];
+    let (mut before, mut known) = ([rows[0]; CONTACTS], 0);
+    for row in rows.iter_mut().filter(|row| row.touching) {
+        before[known] = *row;
+        known += 1;
+        row.part();
+    }
+    let before = &mut before[..known];
+    let held = if I::HOLDS && known > 0 {
+        law.hold(
+            wall.coefficients(law, scene.grains, grain),
+            scene.grains.turn[grain][3],
+        )
+    } else {
+        0.0
+    };
+    let seen = |near: &Near| vector(x) + near.shift - wall.pose.position;
+    let mut offers = Offers::none();
+    if let Shape::Mesh(mesh) = &wall.wall.shape {
+        for (near, number) in near.iter().zip(0..) {
+            let centre = wall.pose.inward(&seen(near));
+            if let Some(foot) = mesh.offer(near.triangle, &centre, x[3] + held) {
+                offers.take(foot, number);
+            }
+        }
+    }
+    let contacts = offers.contacts(x[3]);
+    let mut deepest: f64 = 0.0;
+    for (row, (foot, number)) in rows.iter_mut().zip(contacts.feet()) {
+        let seen = vector(x) + near[*number as usize].shift - wall.pose.position;
+        let normal = wall.pose.outward(&foot.normal);
+        if let Some(same) = take_same(before, &normal) {
+            *row = same;
+        }
+        let meeting = Meeting {
+            grain,
+            seen,
+            foot: Foot { normal, ..*foot },
+        };
+        deepest = deepest.max(row.evaluate(law, wall, &meeting, scene));
+    }
+    deepest
+}
+
+/// Takes out the contact whose normal is nearest to this one, if one is near.
+fn take_same(before: &mut [WallContact], normal: &Vector3<f64>) -> Option<WallContact> {
+    let turned = |c: &WallContact| normal.dot(&Vector3::from(c.normal));
+    let left = before.iter_mut().filter(|c| c.touching);
+    let same = left.max_by(|a, b| turned(a).total_cmp(&turned(b)))?;
+    if turned(same) < SAME {
+        return None;
+    }
+    let taken = *same;
+    same.touching = false;
+    Some(taken)
 }
 
 /// Notes how far from its origin a wall may meet grains, and lets its travel start.
@@ -256,12 +420,10 @@ impl WallContact {
         scene: &Scene,
     ) -> f64 {
         let grains = scene.grains;
-        let g = meeting.grain;
+        let (g, foot) = (meeting.grain, &meeting.foot);
         let (x, v, s) = (&grains.place[g], &grains.motion[g], &grains.turn[g]);
-        let pair =
-            usize::from(grains.material[g]) * law.materials() + usize::from(wall.wall.material);
-        let coefficients = &law.table()[pair];
-        let overlap = x[3] - meeting.distance;
+        let coefficients = wall.coefficients(law, grains, g);
+        let overlap = x[3] - foot.distance;
         let held = if I::HOLDS && self.history[I::HISTORY - 1] != 0.0 {
             law.hold(coefficients, s[3])
         } else {
@@ -273,20 +435,20 @@ impl WallContact {
             }
             return 0.0;
         }
-        let normal = Vec3([meeting.normal.x, meeting.normal.y, meeting.normal.z]);
+        let normal = Vec3([foot.normal.x, foot.normal.y, foot.normal.z]);
         let begins = !self.touching || normal.dot(Vec3(self.normal)) < 0.0;
         if begins {
             self.history = [0.0; HISTORY_MAX];
         }
         let share = match scene.lever {
-            Lever::ContactPoint => meeting.distance / x[3],
+            Lever::ContactPoint => foot.distance / x[3],
             Lever::Radius => 1.0,
         };
         let turn = Vec3([s[0], s[1], s[2]]).scale(share);
         let mut velocity = Vec3([v[0], v[1], v[2]]) - turn.cross(normal);
         let mut spin = Vec3([s[0], s[1], s[2]]).scale(s[3]);
         if wall.moves() {
-            let arm = meeting.seen - meeting.normal * meeting.distance;
+            let arm = meeting.seen - foot.normal * foot.distance;
             velocity = velocity - Vec3(wall.velocity_at(&arm).into());
             spin = spin - Vec3(wall.spin.into());
         }

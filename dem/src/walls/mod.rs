@@ -16,6 +16,7 @@ mod disk;
 mod frustum;
 mod load;
 mod meridian;
+pub mod mesh;
 mod motion;
 mod plane;
 mod pose;
@@ -30,6 +31,7 @@ pub use cylinder::Cylinder;
 pub use disk::Disk;
 pub use frustum::{Ends, Frustum};
 pub use load::{WallImpulse, WallLoad};
+pub use mesh::{Mesh, MeshError, MeshReport};
 pub use motion::{Motion, Rotation, Sine, Staircase, Table};
 pub use plane::Plane;
 pub use pose::Pose;
@@ -42,6 +44,7 @@ pub(crate) use standing::{Span, Standing};
 
 use crate::setup::{SetupError, check};
 use nalgebra::Vector3;
+use std::sync::Arc;
 
 /// A wall.
 #[derive(Clone, Debug, PartialEq)]
@@ -115,6 +118,11 @@ impl Wall {
     /// A frustum whose first end lies at a point (m).
     pub fn frustum(point: Vector3<f64>, frustum: Frustum) -> Wall {
         Wall::new(Shape::Frustum(frustum), Pose::at(point))
+    }
+
+    /// A mesh whose vertices are given in space.
+    pub fn mesh(mesh: Arc<Mesh>) -> Wall {
+        Wall::new(Shape::Mesh(mesh), Pose::at(Vector3::zeros()))
     }
 
     /// The same wall of another material.

@@ -6,11 +6,13 @@
 use super::cylinder::Cylinder;
 use super::disk::Disk;
 use super::frustum::{Ends, Frustum};
+use super::mesh::Mesh;
 use super::plane::Plane;
 use super::rectangle::Rectangle;
 use super::sphere_shell::SphereShell;
 use crate::setup::{SetupError, check};
 use nalgebra::Vector3;
+use std::sync::Arc;
 
 /// On which side of a closed or endless surface grains live.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -47,6 +49,8 @@ pub enum Shape {
     Frustum(Frustum),
     /// A sphere.
     SphereShell(SphereShell),
+    /// A triangle mesh; a sphere may touch it in several points.
+    Mesh(Arc<Mesh>),
 }
 
 impl Shape {
@@ -60,6 +64,7 @@ impl Shape {
             Shape::Cylinder(shape) => shape.foot(centre),
             Shape::Frustum(shape) => shape.foot(centre),
             Shape::SphereShell(shape) => shape.foot(centre),
+            Shape::Mesh(mesh) => mesh.foot(centre),
         }
     }
 
@@ -72,6 +77,7 @@ impl Shape {
             Shape::Cylinder(c) => c.radius.hypot(c.half_length),
             Shape::Frustum(f) => f.radii[0].max(f.radii[1].hypot(f.height)),
             Shape::SphereShell(shell) => shell.radius,
+            Shape::Mesh(mesh) => mesh.extent(),
         }
     }
 
@@ -80,7 +86,7 @@ impl Shape {
     pub(crate) fn is_plate(&self) -> bool {
         match self {
             Shape::Plane(_) => false,
-            Shape::Disk(_) | Shape::Rectangle(_) => true,
+            Shape::Disk(_) | Shape::Rectangle(_) | Shape::Mesh(_) => true,
             Shape::Cylinder(Cylinder { side, .. }) => *side == Side::Both,
             Shape::Frustum(frustum) => frustum.ends == Ends::Open(Side::Both),
             Shape::SphereShell(shell) => shell.side == Side::Both,
@@ -124,6 +130,8 @@ impl Shape {
                 length("radii, the larger", frustum.radii[0].max(frustum.radii[1]))
             }
             Shape::SphereShell(shell) => length("radius", shell.radius),
+            // Checked when it was made.
+            Shape::Mesh(_) => Ok(()),
         }
     }
 }

@@ -1,12 +1,15 @@
 //! A wall during a run: where it is, how it moves, what it carries.
 
 use super::load::{WallImpulse, WallLoad};
+use super::mesh::Mesh;
 use super::motion::Motion;
 use super::pose::Pose;
 use super::servo::Course;
 use super::shape::Shape;
 use super::{Foot, Wall};
+use crate::contact::{COEFFICIENTS, Interaction};
 use crate::domain::Domain;
+use crate::grains::Grains;
 use nalgebra::Vector3;
 
 /// A wall and its state.
@@ -156,5 +159,55 @@ impl Standing {
             Shape::Plane(plane) if self.upright => drift.dot(&plane.normal).abs(),
             _ => drift.norm(),
         }
+    }
+
+    /// Coefficients of the law between the wall and a grain.
+    #[inline(always)]
+    pub fn coefficients<'a, I: Interaction>(
+        &self,
+        law: &'a I,
+        grains: &Grains,
+        grain: usize,
+    ) -> &'a [f64; COEFFICIENTS] {
+        let own = usize::from(grains.material[grain]) * law.materials();
+        &law.table()[own + usize::from(self.wall.material)]
+    }
+
+    /// Shows the images of a centre that are nearer than `reach` to the box of a mesh: what to add to
+    /// the centre, and the image in the mesh's own coordinates. Returns the distance of the nearest (m).
+    pub fn images_near(
+        &self,
+        mesh: &Mesh,
+        x: &Vector3<f64>,
+        reach: f64,
+        domain: &Domain,
+        mut see: impl FnMut(Vector3<f64>, &Vector3<f64>),
+    ) -> f64 {
+        let [low, high] = mesh.bounds();
+        let middle = self.pose.position + self.pose.outward(&(0.5 * (low + high)));
+        let apart = x - middle;
+        let lengths = domain.lengths();
+        // Whole lengths, so that an image has the same bits whenever it is looked for.
+        let home = (domain.nearest_image(apart) - apart).component_div(&lengths);
+        let home = home.map(f64::round);
+        let round = domain
+            .periodic
+            .map(|periodic| if periodic { -1..=1 } else { 0..=0 });
+        let mut nearest = f64::INFINITY;
+        for i in round[0].clone() {
+            for j in round[1].clone() {
+                for k in round[2].clone() {
+                    let turns = home + Vector3::new(i, j, k).map(f64::from);
+                    let shift = lengths.component_mul(&turns);
+                    let centre = self.pose.inward(&(x + shift - self.pose.position));
+                    let distance = mesh.box_distance(&centre);
+                    nearest = nearest.min(distance);
+                    if distance < reach {
+                        see(shift, &centre);
+                    }
+                }
+            }
+        }
+        nearest
     }
 }

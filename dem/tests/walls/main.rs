@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod meshes;
 mod moving;
 mod scene;
 mod shapes;
