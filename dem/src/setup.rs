@@ -6,7 +6,7 @@ use crate::contact::{
 };
 use crate::domain::Domain;
 use crate::grains::Grain;
-use crate::timestep::{self, Choice, Conditions, Limit, Pair, Shares};
+use crate::timestep::{self, Choice, Conditions, Pair, Shares};
 use crate::walls::Wall;
 use nalgebra::Vector3;
 
@@ -280,20 +280,15 @@ impl Setup {
     /// Not part of [`crate::Simulation::new`]: where a pair never touches, its limit does not matter.
     pub fn check_timestep(&self, conditions: &Conditions) -> Result<(), SetupError> {
         let choice = self.choose_step(conditions, &Shares::default())?;
-        match choice.hard() {
-            Some(&Limit {
-                name,
-                seconds,
-                pair,
-                ..
-            }) if self.timestep >= seconds => Err(SetupError::Unstable {
+        match choice.broken_by(self.timestep) {
+            Some(limit) => Err(SetupError::Unstable {
                 timestep: self.timestep,
-                below: seconds,
-                limit: name,
-                pair,
-                would_do: choice.seconds,
+                below: limit.seconds,
+                limit: limit.name,
+                pair: limit.pair,
+                would_do: choice.allowed(),
             }),
-            _ => Ok(()),
+            None => Ok(()),
         }
     }
 }

@@ -5,11 +5,11 @@ mod law;
 
 use crate::failure::Failure;
 use crate::run;
-use crate::run::step::Step;
+use crate::run::step;
 use crate::scene::{BagnoldScene, ImpactScene, InclineScene, InclineStart, Scene, SceneBody};
 use colluvium_coupling::incline::{InclineRun, InclineSpec};
 use colluvium_dem::preparation::settle_incline_bed;
-use colluvium_dem::timestep::{self, Limit};
+use colluvium_dem::timestep::Choice;
 use colluvium_dem::{Normal, Threads};
 use std::fmt::Write;
 use std::ops::ControlFlow;
@@ -36,13 +36,14 @@ impl Lines {
         let _ = writeln!(self.0, "{topic:<16} {text}");
     }
 
-    /// A step, what binds it, and every other limit with the step that it would allow.
-    fn say_step(&mut self, step: f64, binding: &str, all: &[Limit]) {
-        self.say("time step", &format!("{step:.4e} s: {binding}"));
-        for limit in all.iter().skip(1) {
-            self.say("", &format!("{:.4e} s would be {limit}", limit.step()));
+    /// A step, what is said of it, and every other limit with the step that it would allow.
+    fn say_step(&mut self, step: f64, words: &str, choice: &Choice) {
+        self.say("time step", &format!("{step:.4e} s: {words}"));
+        for limit in choice.all.iter().skip(1) {
+            let allowed = choice.safety * limit.step();
+            self.say("", &format!("{allowed:.4e} s would be {limit}"));
         }
-        if let Some(hard) = timestep::hard(all) {
+        if let Some(hard) = choice.hard() {
             self.say(
                 "",
                 &format!(
@@ -88,11 +89,8 @@ fn measured_rate(scene: &InclineScene) -> Option<f64> {
 
 fn incline(scene: &Scene, body: &InclineScene) -> Result<String, Failure> {
     let mut lines = Lines::default();
-    let Step {
-        seconds: step,
-        limit: step_limit,
-        all: all_limits,
-    } = run::incline::step(body);
+    let choice = run::incline::step(body);
+    let step = choice.seconds;
     let grains = body.free_grains();
     let [length, width] = body.floor_edges();
     let mass = body.mean_mass();
@@ -141,7 +139,7 @@ fn incline(scene: &Scene, body: &InclineScene) -> Result<String, Failure> {
             100.0 * struck / (0.5 * body.grains.diameter)
         ),
     );
-    lines.say_step(step, &step_limit, &all_limits);
+    lines.say_step(step, &step::chosen(&choice), &choice);
     let least = ((body.time.relax + body.time.average) / step).ceil();
     let most = (body.time.limit / step).ceil();
     lines.say(
@@ -291,8 +289,8 @@ fn impact(scene: &Scene, body: &ImpactScene) -> Result<String, Failure> {
             impact.contact_time,
         ),
     );
-    let step = impact.step.seconds;
-    lines.say_step(step, &impact.step.limit, &impact.step.all);
+    let step = &impact.step;
+    lines.say_step(step.seconds, &step::chosen(step), step);
     lines.say(
         "steps",
         &format!("{:.0}, well under a second per million", impact.steps()),

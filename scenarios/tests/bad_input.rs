@@ -314,7 +314,14 @@ const CASES: &[(&[&str], &[&str])] = &[
     ),
     (
         &["run", "chute", "--set", "timestep=0.01"],
-        &["timestep", "0.01", "(0, ", "unstable"],
+        &[
+            "chute",
+            "timestep",
+            "0.01",
+            "(0, 0.00304)",
+            "unstable",
+            "would do",
+        ],
     ),
     (
         &["run", "chute", "--set", "steps=10", "--set", "duration=1"],
@@ -396,7 +403,44 @@ const CASES: &[(&[&str], &[&str])] = &[
     ),
     (
         &["run", "settle", "--set", "timestep=1e-3"],
-        &["timestep", "0.001", "unstable"],
+        &["settle", "timestep", "0.001", "unstable", "would do"],
+    ),
+    (
+        &[
+            "run",
+            "two-spheres",
+            "--set",
+            "steps_per_contact=10",
+            "--set",
+            "safety=9",
+        ],
+        &["two-spheres", "safety", "9", "unstable", "1.0 would do"],
+    ),
+    (
+        &[
+            "run",
+            "incline-moderate",
+            "--set",
+            "timestep.steps_per_contact=10",
+            "--set",
+            "timestep.safety=9",
+        ],
+        &["timestep.safety", "9", "unstable", "1.0 would do"],
+    ),
+    (
+        &[
+            "calibrate",
+            "incline-moderate",
+            "--set",
+            "timestep.safety=4",
+            "--set",
+            "timestep.steps_per_contact=10",
+        ],
+        &["timestep.safety", "4", "unstable", "would do"],
+    ),
+    (
+        &["run", "incline-glass", "--set", "timestep.safety=0"],
+        &["timestep.safety", "0", "[0.01, 10]"],
     ),
     (
         &[
@@ -470,6 +514,45 @@ fn bad_input_ends_with_status_2_and_leaves_nothing() {
     }
     assert_eq!(fs::read_dir(at("others")).unwrap().count(), 1);
     assert_eq!(fs::read_dir(at("mine")).unwrap().count(), 2);
+}
+
+#[test]
+fn a_step_that_is_said_to_do_does() {
+    let folder = tempfile::tempdir().unwrap();
+    for (scene, key, set) in [
+        ("chute", "timestep", "scale=1"),
+        ("settle", "timestep", "coarse_graining=2"),
+        ("two-spheres", "safety", "steps_per_contact=10"),
+    ] {
+        let check = |value: &str| {
+            let step = format!("{key}={value}");
+            let arguments = ["check", scene, "--set", set, "--set", &step];
+            colluvium(folder.path(), &arguments)
+        };
+        let refused = check(if key == "safety" { "9" } else { "0.01" });
+        assert_eq!(refused.status.code(), Some(2), "{scene}");
+        let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+        let number = |before: &str, after: &str| -> f64 {
+            let (_, rest) = message.split_once(before).unwrap();
+            let (number, _) = rest.split_once(after).unwrap();
+            number.rsplit(' ').next().unwrap().parse().unwrap()
+        };
+        let (below, does) = (number("allowed: (0, ", ")"), number("; ", " would do"));
+        assert!(does < below, "{message}");
+        for (value, status) in [(does, 0), (0.99 * below, 0), (1.01 * below, 2)] {
+            let done = check(&format!("{value:e}"));
+            assert_eq!(done.status.code(), Some(status), "{scene} {value}");
+        }
+    }
+    // A file of one's own is named.
+    fs::write(
+        folder.path().join("mine.toml"),
+        "scene = \"chute\"\ntimestep = 0.01\n",
+    )
+    .unwrap();
+    let refused = colluvium(folder.path(), &["run", "mine.toml"]);
+    assert_eq!(refused.status.code(), Some(2));
+    assert!(String::from_utf8_lossy(&refused.stderr).contains("mine.toml: key `timestep`"));
 }
 
 #[test]

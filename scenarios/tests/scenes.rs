@@ -150,6 +150,26 @@ fn a_fast_rolling_spring_shortens_the_step() {
 }
 
 #[test]
+fn a_safety_factor_changes_the_step_and_is_said() {
+    let folder = tempfile::tempdir().unwrap();
+    let model = |safety: &str| {
+        let set = format!("safety={safety}");
+        let arguments = ["run", "two-spheres", "--set", &set, "--out", "a"];
+        succeed(folder.path(), &arguments);
+        let model = summary(&folder.path().join("a"))["model"].clone();
+        let limit = model["dt_limit"].as_str().unwrap().to_owned();
+        (model["dt_s"].as_f64().unwrap(), limit)
+    };
+    let (step, limit) = model("1");
+    assert!(limit.starts_with("contact time: 1/2000 of "), "{limit}");
+    for (safety, factor) in [("0.5", 0.5), ("4", 4.0)] {
+        let (scaled, said) = model(safety);
+        assert_eq!(scaled, factor * step);
+        assert_eq!(said, format!("safety factor {safety} on {limit}"));
+    }
+}
+
+#[test]
 fn under_gravity_no_balance_of_angular_momentum_is_reported() {
     let folder = tempfile::tempdir().unwrap();
     for (gravity, reported) in [("0", true), ("9.81", false)] {

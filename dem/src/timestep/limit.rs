@@ -96,6 +96,8 @@ impl fmt::Display for Limit {
 pub struct Choice {
     /// The step (s); infinite if nothing limits it.
     pub seconds: f64,
+    /// What it is of the step that the limits allow: a scene's own safety factor.
+    pub safety: f64,
     /// Name of the limit that binds.
     pub binding: &'static str,
     /// All limits, the binding one first.
@@ -108,9 +110,19 @@ impl Choice {
         self.all.first()
     }
 
+    /// The longest step within its share of every limit (s), whatever the safety factor.
+    pub fn allowed(&self) -> f64 {
+        self.limit().map_or(f64::INFINITY, Limit::step)
+    }
+
     /// The shortest time at which a contact blows up, and its name.
     pub fn hard(&self) -> Option<&Limit> {
         hard(&self.all)
+    }
+
+    /// The limit at or beyond which `timestep` (s) lies, so that one contact blows up.
+    pub fn broken_by(&self, timestep: f64) -> Option<&Limit> {
+        self.hard().filter(|limit| timestep >= limit.seconds)
     }
 }
 

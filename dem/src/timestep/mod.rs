@@ -204,6 +204,7 @@ pub fn choose(mut limits: Vec<Limit>, safety: f64) -> Choice {
         .map_or((f64::INFINITY, "none"), |l| (l.step(), l.name));
     Choice {
         seconds: safety * seconds,
+        safety,
         binding,
         all: limits,
     }

@@ -4,6 +4,7 @@ use super::{Lines, law};
 use crate::failure::Failure;
 use crate::run;
 use crate::run::bed::Bed;
+use crate::run::step;
 use crate::scene::{ChuteScene, SettleScene};
 use colluvium_dem::{Simulation, Threads};
 use std::time::Instant;
@@ -104,26 +105,19 @@ fn rest(
         );
     }
     lines.say("left out", &left_out.join(", "));
-    let limit = bed.limit();
     let pace = bed.pace;
     lines.say(
         "overlap",
         &format!(
             "about {:.2} % of the radius in an impact at {:.3} m/s, the fastest to be expected",
-            100.0 * limit.overlap,
+            100.0 * bed.struck(),
             bed.speed
         ),
     );
-    lines.say(
-        "time step",
-        &format!(
-            "{:.4e} s: given; {:.1} steps in half a period of the lightest grain's contact, {:.0} % of the stability limit of its fastest spring, {:.3e} s",
-            pace.timestep,
-            limit.half_period / pace.timestep,
-            100.0 * pace.timestep / limit.stability,
-            limit.stability
-        ),
-    );
+    let choice = bed
+        .allowed_step()
+        .map_err(|error| Failure::Input(error.to_string()))?;
+    lines.say_step(pace.timestep, &step::given(pace.timestep, &choice), &choice);
     let grains = bed.setup.grains.len() as u64;
     let work = pace.steps * grains;
     lines.say(

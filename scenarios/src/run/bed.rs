@@ -1,7 +1,7 @@
 //! A bed of grains from its start through a given number of steps: what `chute` and `settle` share.
 
-use super::impact_scales;
 use super::{Findings, Under};
+use super::{impact_scales, step};
 use crate::cost::Cost;
 use crate::failure::Failure;
 use crate::progress::Bar;
@@ -9,9 +9,8 @@ use crate::scene::{CohesionKind, Pace, Parts, RollingKind, Scene, SceneError, Ta
 use crate::start_file::{self, StartError};
 use crate::summary::{Model, Quantity, Summary};
 use crate::table::Table;
-use colluvium_dem::{
-    ContactLaw, Grain, Partner, Record, Setup, SetupError, Simulation, Snapshot, timestep,
-};
+use colluvium_dem::timestep::{Choice, Conditions, Shares};
+use colluvium_dem::{ContactLaw, Grain, Partner, Record, Setup, SetupError, Simulation, Snapshot};
 use nalgebra::Vector3;
 use std::path::Path;
 
@@ -77,32 +76,27 @@ pub struct Ran {
     pub snapshot: Snapshot,
 }
 
-/// Time step and what stands against a longer one.
-#[derive(Clone, Copy, Debug)]
-pub struct Limit {
-    /// Stability limit of a contact of two of the lightest free grains, dashpots included (s).
-    pub stability: f64,
-    /// Half a period of the same grain's contact with an equal one (s).
-    pub half_period: f64,
-    /// Overlap it was taken at, over the radius.
-    pub overlap: f64,
-}
-
 impl Bed {
-    /// What limits the time step, at the overlap of the fastest impact to be expected.
-    pub fn limit(&self) -> Limit {
+    /// The limits of the step and the step they allow, at the fastest impact to be expected and under
+    /// the bed's own weight.
+    pub fn allowed_step(&self) -> Result<Choice, SetupError> {
+        let down = Vector3::new(0.0, 0.0, self.setup.gravity.z);
+        let conditions = Conditions {
+            speed: self.speed,
+            overlap: 0.0,
+            ..Conditions::of(&self.setup.grains, &down)
+        };
+        self.setup.choose_step(&conditions, &Shares::default())
+    }
+
+    /// Overlap of the fastest impact of two of the lightest free grains, over their radius.
+    pub fn struck(&self) -> f64 {
         let free = self.setup.grains.iter().filter(|g| !g.fixed);
         let lightest = free.min_by(|a, b| a.mass().total_cmp(&b.mass()));
-        let lightest = lightest
-            .copied()
-            .unwrap_or_else(|| Grain::at_rest(Vector3::zeros(), 1.0, 1.0));
-        let (mass, radius) = (lightest.mass(), lightest.radius);
-        let overlap = impact_scales::overlap(&self.law, 0.5 * mass, 0.5 * radius, self.speed);
-        Limit {
-            stability: timestep::contact_limit(&self.law, &lightest, Some(&lightest), overlap).0,
-            half_period: impact_scales::half_period(&self.law, 0.5 * mass, 0.5 * radius, overlap),
-            overlap: overlap / radius,
-        }
+        lightest.map_or(0.0, |g| {
+            let (mass, radius) = (0.5 * g.mass(), 0.5 * g.radius);
+            impact_scales::overlap(&self.law, mass, radius, self.speed) / g.radius
+        })
     }
 
     /// Free grains.
@@ -137,20 +131,14 @@ pub fn check(scene: &Scene, bed: Bed, timestep_key: f64) -> Result<(), Failure> 
         let path = scene.body.start_file().unwrap_or_default();
         return Err(refused_start(path, "all grains are frozen".into()).into());
     }
-    let limit = bed.limit();
-    if bed.pace.timestep > limit.stability {
-        let range = format!(
-            "(0, {:.3e}): above it the fastest spring of the lightest grain is unstable",
-            limit.stability * timestep_key / bed.pace.timestep
-        );
-        return Err(scene.out_of_range("timestep", timestep_key, &range).into());
-    }
-    Simulation::new(bed.setup)
-        .map(drop)
-        .map_err(|error| match scene.body.start_file() {
-            Some(path) => refused_start(path, error.to_string()).into(),
-            None => Failure::Input(format!("{}: {error}", scene.origin)),
-        })
+    let refused = |error: SetupError| match scene.body.start_file() {
+        Some(path) => refused_start(path, error.to_string()).into(),
+        None => Failure::Input(format!("{}: {error}", scene.origin)),
+    };
+    let choice = bed.allowed_step().map_err(refused)?;
+    let step = bed.pace.timestep;
+    step::check(scene, &choice, step, "timestep", timestep_key)?;
+    Simulation::new(bed.setup).map(drop).map_err(refused)
 }
 
 /// Runs a bed.
@@ -245,20 +233,23 @@ fn look(simulation: &mut Simulation, snapshot: &mut Snapshot, floor: f64) -> Row
 }
 
 /// What every bed reports.
-pub fn findings(bed: &Bed, mut ran: Ran, left_out: Vec<String>, under: &Under) -> Findings {
+pub fn findings(
+    bed: &Bed,
+    mut ran: Ran,
+    left_out: Vec<String>,
+    under: &Under,
+) -> Result<Findings, Failure> {
     let simulation = &mut ran.simulation;
     let grains = simulation.grain_count() as u64;
     let mut summary = Summary::begun(&under.scene.name, "run");
-    let limit = bed.limit();
+    let choice = bed
+        .allowed_step()
+        .map_err(|error| Failure::Run(error.to_string()))?;
     summary.model = Model {
         grains,
         cells: 0,
         dt_s: bed.pace.timestep,
-        dt_limit: format!(
-            "given: {:.1} steps in half a period of the lightest grain's contact, {:.0} % of its stability limit",
-            limit.half_period / bed.pace.timestep,
-            100.0 * bed.pace.timestep / limit.stability
-        ),
+        dt_limit: step::given(bed.pace.timestep, &choice),
         left_out,
     };
     summary.cost = Cost::measured(under.wall_s(), under.threads, bed.pace.steps * grains, 0);
@@ -303,11 +294,11 @@ pub fn findings(bed: &Bed, mut ran: Ran, left_out: Vec<String>, under: &Under) -
     for (n, (name, unit)) in COLUMNS.into_iter().enumerate() {
         table = table.with(name, unit, ran.rows.iter().map(|row| row[n]).collect());
     }
-    Findings {
+    Ok(Findings {
         summary,
         tables: vec![table],
         grains: Some(super::grain_table::of(&ran.snapshot)),
-    }
+    })
 }
 
 /// Volume of spheres in the middle half of the depth over the volume of that layer; the depth is

@@ -232,7 +232,7 @@ fn is_bundled(scene: &Scene) -> bool {
 pub(super) fn run(scene: &ChuteScene, under: &mut Under) -> Result<Findings, Failure> {
     let bed = prepare(scene, under.threads_of_one_run())?;
     let ran = bed::run(&bed, under)?;
-    let mut found = bed::findings(&bed, ran, left_out(scene), under);
+    let mut found = bed::findings(&bed, ran, left_out(scene), under)?;
     let energy = &found.tables[0];
     let rows: Vec<(f64, f64)> = energy.pairs("step", "translation");
     let velocity = energy.column("velocity").last().copied();

@@ -1,7 +1,7 @@
 //! One impact: two spheres, or a sphere on the plane z = 0.
 
 use super::impact_scales;
-use super::step::{Step, choose};
+use super::step;
 use super::{Findings, Under};
 use crate::cost::Cost;
 use crate::failure::Failure;
@@ -9,7 +9,7 @@ use crate::progress::Bar;
 use crate::scene::{ImpactScene, RollingKeys, Scene, SceneError};
 use crate::summary::{Model, Quantity, Summary};
 use crate::table::Table;
-use colluvium_dem::timestep::Conditions;
+use colluvium_dem::timestep::{Choice, Conditions, Shares};
 use colluvium_dem::{
     Cohesion, ContactLaw, Damping, Domain, Grain, GrainSample, Normal, Record, Setup, SetupError,
     ShapeParameter, Simulation, Snapshot, Threads, Wall,
@@ -43,7 +43,7 @@ pub struct Impact {
     /// Duration (s).
     pub duration: f64,
     /// Time step.
-    pub step: Step,
+    pub step: Choice,
 }
 
 impl Impact {
@@ -87,6 +87,8 @@ pub(super) fn check(scene: &Scene, body: &ImpactScene) -> Result<(), Failure> {
         );
         return Err(scene.out_of_range(key, value, &range).into());
     }
+    let seconds = impact.step.seconds;
+    step::check(scene, &impact.step, seconds, "safety", body.safety)?;
     Simulation::new(impact.setup)
         .map(drop)
         .map_err(|error| Failure::Input(format!("{}: {error}", scene.origin)))
@@ -164,14 +166,13 @@ pub fn prepare(scene: &ImpactScene, pair: bool) -> Result<Impact, SceneError> {
         overlap: overlap.max(0.0) / radius,
         ..Conditions::default()
     };
-    let step = choose(
-        undamped,
-        scene.steps_per_contact,
-        &law,
-        &grains,
-        !pair,
-        &conditions,
-    );
+    let shares = Shares {
+        steps_per_contact: scene.steps_per_contact,
+        contact_time: Some(undamped),
+        safety: scene.safety,
+        ..Shares::default()
+    };
+    let step = step::choose(&law, &grains, !pair, &conditions, &shares);
     Ok(Impact {
         overlap,
         law,
@@ -310,7 +311,7 @@ pub(super) fn run(scene: &ImpactScene, under: &mut Under) -> Result<Findings, Fa
         grains: bodies as u64,
         cells: 0,
         dt_s: timestep,
-        dt_limit: impact.step.limit.clone(),
+        dt_limit: step::chosen(&impact.step),
         left_out: left_out(scene),
     };
     summary.cost = Cost::measured(under.wall_s(), 1, steps * bodies as u64, 0);

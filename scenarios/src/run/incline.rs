@@ -1,7 +1,7 @@
 //! Grains on an inclined plane: from the scene to profiles.
 
 use super::impact::shape;
-use super::step::{Step, choose};
+use super::step;
 use super::{Findings, Under};
 use crate::cost::Cost;
 use crate::failure::Failure;
@@ -15,7 +15,7 @@ use colluvium_coupling::incline::{
     InclineError, InclineResult, InclineRun, InclineSpec, Outcome, Purpose, SeriesPoint, Start,
 };
 use colluvium_dem::preparation::{Bed, InclineBed, RadiusLaw, settle_incline_bed};
-use colluvium_dem::timestep::{self, Conditions};
+use colluvium_dem::timestep::{self, Choice, Conditions, Shares};
 use colluvium_dem::{ContactLaw, Grain, Hooke, SetupError, Snapshot, TangentialSpring, Threads};
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
@@ -59,7 +59,7 @@ pub fn law(scene: &InclineScene) -> ContactLaw {
 
 /// The time step of a scene: that of two mean grains (Eq. 2.7) unless another limit of the smallest
 /// needs a finer one.
-pub fn step(scene: &InclineScene) -> Step {
+pub fn step(scene: &InclineScene) -> Choice {
     let contact_time = timestep::step(scene.mean_mass(), scene.stiffness(), 1.0);
     let smallest = Grain::at_rest(
         Vector3::zeros(),
@@ -71,14 +71,13 @@ pub fn step(scene: &InclineScene) -> Step {
         speed: (2.0 * scene.gravity * scene.grains.diameter).sqrt(),
         ..Conditions::default()
     };
-    choose(
-        contact_time,
-        scene.timestep.steps_per_contact,
-        &law(scene),
-        &[smallest],
-        false,
-        &conditions,
-    )
+    let shares = Shares {
+        steps_per_contact: scene.timestep.steps_per_contact,
+        contact_time: Some(contact_time),
+        safety: scene.timestep.safety,
+        ..Shares::default()
+    };
+    step::choose(&law(scene), &[smallest], false, &conditions, &shares)
 }
 
 /// The bed that a scene asks for.
@@ -253,7 +252,7 @@ pub fn model(scene: &InclineScene, bed: &Bed) -> Model {
         grains: bed.grains.len() as u64,
         cells: 0,
         dt_s: step.seconds,
-        dt_limit: step.limit,
+        dt_limit: step::chosen(&step),
         left_out: left_out(scene),
     }
 }

@@ -1,6 +1,6 @@
 //! What can be wrong with an incline or a campaign, found before anything is written.
 
-use super::incline;
+use super::{incline, step};
 use crate::failure::Failure;
 use crate::scene::{InclineScene, Scene, SceneError};
 use colluvium_coupling::campaign::{CampaignError, CampaignSpec};
@@ -38,6 +38,9 @@ pub fn incline(scene: &Scene, body: &InclineScene) -> Result<(), Failure> {
         |error: colluvium_dem::SetupError| Failure::Input(format!("{}: {error}", scene.origin));
     bed.radius.validate().map_err(plain)?;
     bed.law.validate().map_err(plain)?;
+    let step = incline::step(body);
+    let safety = body.timestep.safety;
+    step::check(scene, &step, step.seconds, "timestep.safety", safety)?;
     let spec = incline::spec(body, &stand_in_bed(body), Threads::Serial);
     match InclineRun::new(spec) {
         Ok(_) => Ok(()),

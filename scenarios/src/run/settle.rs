@@ -145,7 +145,7 @@ pub fn left_out(scene: &SettleScene) -> Vec<String> {
 pub(super) fn run(scene: &SettleScene, under: &mut Under) -> Result<Findings, Failure> {
     let bed = prepare(scene, under.threads_of_one_run())?;
     let ran = bed::run(&bed, under)?;
-    Ok(bed::findings(&bed, ran, left_out(scene), under))
+    bed::findings(&bed, ran, left_out(scene), under)
 }
 
 #[cfg(test)]

@@ -1,58 +1,76 @@
-//! The time step of grains, and what limits it.
+//! The time step of grains, chosen or given: what limits it, in words, and which one is refused.
 
-use colluvium_dem::timestep::{Choice, Conditions, Limit, Shares, choose as choose_among, limits};
+use crate::scene::{Scene, SceneError};
+use colluvium_dem::timestep::{self, Choice, Conditions, Shares};
 use colluvium_dem::{ContactLaw, Grain, LawTable};
 
-/// A time step and its reason.
-#[derive(Clone, Debug, PartialEq)]
-pub struct Step {
-    /// The step (s).
-    pub seconds: f64,
-    /// What limits it, in words.
-    pub limit: String,
-    /// All limits, the binding one first.
-    pub all: Vec<Limit>,
-}
-
-impl From<Choice> for Step {
-    fn from(choice: Choice) -> Step {
-        Step {
-            seconds: choice.seconds,
-            limit: choice
-                .limit()
-                .map_or_else(|| "nothing".into(), ToString::to_string),
-            all: choice.all,
-        }
-    }
-}
-
-/// The step of grains of one law: its own contact time over the steps per contact, unless another
-/// limit of these grains (and of walls of the same material) is shorter.
+/// The step of grains of one law: what the shares take of its own contact time, unless another limit of
+/// these grains (and of walls of the same material) is shorter.
 pub fn choose(
-    contact_time: f64,
-    steps_per_contact: f64,
     law: &ContactLaw,
     grains: &[Grain],
     walled: bool,
     conditions: &Conditions,
-) -> Step {
-    let shares = Shares {
-        steps_per_contact,
-        contact_time: Some(contact_time),
-        ..Shares::default()
-    };
+    shares: &Shares,
+) -> Choice {
     // A law that does not stand is refused where the simulation is made, with its key.
-    let Ok(laws) = LawTable::new(&(*law).into()) else {
-        return Step {
-            seconds: contact_time / steps_per_contact,
-            limit: "contact time".into(),
-            all: Vec::new(),
-        };
+    let limits = LawTable::new(&(*law).into()).map_or_else(
+        |_| Vec::new(),
+        |laws| {
+            let walls: &[u16] = if walled { &[0] } else { &[] };
+            timestep::limits(grains, walls, &laws, conditions, shares)
+        },
+    );
+    timestep::choose(limits, shares.safety)
+}
+
+/// What a chosen step goes by.
+pub fn chosen(choice: &Choice) -> String {
+    let limit = choice
+        .limit()
+        .map_or_else(|| "nothing".into(), ToString::to_string);
+    if choice.safety == 1.0 {
+        limit
+    } else {
+        format!("safety factor {} on {limit}", choice.safety)
+    }
+}
+
+/// How a given step (s) stands to what its limits allow.
+pub fn given(step: f64, choice: &Choice) -> String {
+    match choice.limit() {
+        Some(limit) => format!(
+            "given: {:.0} % of what its limits allow, {:.4e} s ({limit})",
+            100.0 * step / choice.allowed(),
+            choice.allowed()
+        ),
+        None => "given: nothing limits it".into(),
+    }
+}
+
+/// Refuses a step (s) at which one contact blows up; the step is in proportion to the `value` of `key`.
+pub fn check(
+    scene: &Scene,
+    choice: &Choice,
+    step: f64,
+    key: &str,
+    value: f64,
+) -> Result<(), SceneError> {
+    let Some(limit) = choice.broken_by(step) else {
+        return Ok(());
     };
-    let walls: &[u16] = if walled { &[0] } else { &[] };
-    choose_among(
-        limits(grains, walls, &laws, conditions, &shares),
-        shares.safety,
-    )
-    .into()
+    let of_key = |seconds: f64| shortened(seconds * value / step);
+    let range = format!(
+        "(0, {:?}): from there on one contact is unstable ({}, {}); {:?} would do",
+        of_key(limit.seconds),
+        limit.name,
+        limit.pair,
+        of_key(choice.allowed())
+    );
+    Err(scene.out_of_range(key, value, &range))
+}
+
+/// To four digits.
+fn shortened(value: f64) -> f64 {
+    format!("{value:.3e}").parse().unwrap_or(value)
 }

@@ -51,6 +51,9 @@ pub struct ImpactScene {
     /// Steps per undamped contact.
     #[schemars(extend("minimum" = 10.0, "maximum" = 1.0e6))]
     pub steps_per_contact: f64,
+    /// Factor on the step that those and all other limits allow.
+    #[schemars(extend("minimum" = 0.01, "maximum" = 10.0))]
+    pub safety: f64,
     /// Rows of `trajectory.csv`.
     #[schemars(extend("minimum" = 2, "maximum" = 1000000))]
     pub rows: u64,

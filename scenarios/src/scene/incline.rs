@@ -135,6 +135,9 @@ pub struct TimestepKeys {
     /// Steps per undamped contact of two mean grains: Δt = π √(m/(2 k_n))/N.
     #[schemars(extend("minimum" = 10.0, "maximum" = 1.0e5))]
     pub steps_per_contact: f64,
+    /// Factor on the step that those and all other limits allow.
+    #[schemars(extend("minimum" = 0.01, "maximum" = 10.0))]
+    pub safety: f64,
 }
 
 /// Duration of a run.
