@@ -200,6 +200,16 @@ fn a_stopped_campaign_keeps_its_angles_and_ends_the_same() {
         "--set",
         "calibration.compare_cells=16",
     ];
+    // Flows this short do not always determine a law: the first seed that does.
+    let whole = folder.path().join("whole");
+    let seed = (1..=8).map(|seed| format!("seed={seed}")).find(|seed| {
+        let one = [&short[..], &["--set", seed, "--threads", "1"]].concat();
+        let done = colluvium(folder.path(), &arguments("calibrate", "whole", &one));
+        assert!(done.status.success());
+        whole.join("rheology.toml").exists()
+    });
+    let seed = seed.unwrap();
+    let short = [&short[..], &["--set", &seed]].concat();
     let parts = folder.path().join("parts");
     let angles = parts.join("angles.json");
     let status = interrupt(
@@ -212,9 +222,6 @@ fn a_stopped_campaign_keeps_its_angles_and_ends_the_same() {
     let resumed = [&short[..], &["--resume"]].concat();
     succeed(folder.path(), &arguments("calibrate", "parts", &resumed));
     assert!(log().contains("finished before"), "{}", log());
-    let one = [&short[..], &["--threads", "1"]].concat();
-    succeed(folder.path(), &arguments("calibrate", "whole", &one));
-    let whole = folder.path().join("whole");
     assert_eq!(hash(&parts), hash(&whole));
     for file in ["rheology.toml", "points.csv"] {
         let bytes = |d: &Path| std::fs::read(d.join(file)).unwrap();
