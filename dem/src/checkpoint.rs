@@ -116,6 +116,8 @@ impl Simulation {
         self.loads.record(&mut record);
         self.bonds.record(&mut record);
         self.fields.record(&mut record);
+        self.moving_box.record(&self.cell(), &mut record);
+        self.drain.record(&mut record);
         record
     }
 
@@ -248,6 +250,8 @@ impl Simulation {
         self.loads.read(record, &grains)?;
         self.bonds.read(record, &grains)?;
         self.fields.read(record)?;
+        self.read_box(record)?;
+        self.drain.read(record)?;
         self.grains = grains;
         self.weigh();
 

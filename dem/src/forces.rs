@@ -95,7 +95,11 @@ pub(crate) fn batch<L: Lanes, I: Interaction>(
     // Differences of the vectors, sums of the fourth numbers.
     let minus = L::repeat(&[-1.0, -1.0, -1.0, 1.0]);
     let [dx, dy, dz, reach] = combine(field.rows.place, i, j, minus);
-    let mut d = [dx, dy, dz];
+    let apart = [dx, dy, dz];
+    let mut d = apart;
+    if field.images.moves {
+        d[0] = d[0] - L::splat(field.images.drift.offset) * turns_across(&field.images, &apart);
+    }
     for (k, d) in d.iter_mut().enumerate() {
         let turns = (*d * L::splat(field.images.inverse[k])).round();
         *d = *d - L::splat(field.images.lengths[k]) * turns;
@@ -115,7 +119,11 @@ pub(crate) fn batch<L: Lanes, I: Interaction>(
         }
         return;
     }
-    let [vx, vy, vz, inverse_mass] = combine(field.rows.motion, i, j, minus);
+    let [mut vx, mut vy, mut vz, inverse_mass] = combine(field.rows.motion, i, j, minus);
+    if field.images.moves {
+        let [wx, wy, wz] = image_velocity(&field.images, &apart);
+        (vx, vy, vz) = (vx - wx, vy - wy, vz - wz);
+    }
     let [sx, sy, sz, curvature] = combine(field.rows.turn, i, j, one);
     // What a scene does not have costs nothing: one material reads no table.
     let mixed;
@@ -197,6 +205,31 @@ fn combine<L: Lanes>(of: &[impl Row], i: &[u32], j: &[u32], sign: L) -> [L; 4] {
         *row = *row + other * sign;
     }
     L::transpose(rows)
+}
+
+/// Boxes between two centres along the axis whose images are shifted along x.
+#[inline(always)]
+fn turns_across<L: Lanes>(images: &Images, apart: &[L; 3]) -> L {
+    if images.drift.gradient == 1 {
+        (apart[1] * L::splat(images.inverse[1])).round()
+    } else {
+        (apart[2] * L::splat(images.inverse[2])).round()
+    }
+}
+
+/// Velocity of the nearest image against the grain itself, where images move.
+#[inline(always)]
+fn image_velocity<L: Lanes>(images: &Images, apart: &[L; 3]) -> [L; 3] {
+    let across = turns_across(images, apart);
+    let mut apart = *apart;
+    apart[0] = apart[0] - L::splat(images.drift.offset) * across;
+    let mut velocity = [L::splat(0.0); 3];
+    for (k, velocity) in velocity.iter_mut().enumerate() {
+        let turns = (apart[k] * L::splat(images.inverse[k])).round();
+        *velocity = L::splat(images.drift.speeds[k]) * turns;
+    }
+    velocity[0] = velocity[0] + L::splat(images.drift.slip) * across;
+    velocity
 }
 
 /// ω_i - ω_j.

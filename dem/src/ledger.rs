@@ -5,7 +5,7 @@
 //! moved grains and walls adds up to the kinetic energy *to round-off*, at any time step:
 //!
 //! ```text
-//! K(now) = K(start) + Σ W_channel + W_gravity + W_drive + W_loads + W_bonds + W_fields
+//! K(now) = K(start) + Σ W_channel + W_gravity + W_drive + W_loads + W_bonds + W_fields + W_boundary
 //! dissipated by a channel = -W_channel - (E_channel(now) - E_channel(start))
 //! ```
 //! E_channel is the energy that the law says its springs hold, so a channel that dissipates less than
@@ -114,6 +114,10 @@ pub struct EnergyLedger {
     /// Work of bonds on grains.
     #[serde(default)]
     pub bonds: Bonding,
+    /// Work of a periodic boundary that moves: by contacts and bonds across it, by grains that cross it
+    /// and where its speed changes.
+    #[serde(default)]
+    pub boundary: f64,
     /// Work of fields of gravity.
     #[serde(default)]
     pub fields: Falling,
@@ -143,7 +147,8 @@ impl EnergyLedger {
             + self.drive
             + self.loads
             + self.bonds.work
-            + self.fields.work;
+            + self.fields.work
+            + self.boundary;
         let entries = [
             self.kinetic_before,
             self.kinetic,
@@ -155,6 +160,7 @@ impl EnergyLedger {
             self.loads,
             self.bonds.work,
             self.fields.work,
+            self.boundary,
         ];
         let scale = entries.iter().fold(0.0_f64, |a, e| a.max(e.abs()));
         if scale > 0.0 {
@@ -174,7 +180,12 @@ impl EnergyLedger {
             [self.kinetic_before, self.kinetic, self.gravity, self.drive],
             [self.loads, bonds.work, bonds.stored_before, bonds.stored],
             [bonds.freed_before, bonds.freed, 0.0, 0.0],
-            [fields.work, fields.potential_before, fields.potential, 0.0],
+            [
+                fields.work,
+                fields.potential_before,
+                fields.potential,
+                self.boundary,
+            ],
             channels(&self.work),
             channels(&self.stored_before),
             channels(&self.stored),
@@ -195,7 +206,7 @@ impl EnergyLedger {
         let [kinetic_before, kinetic, gravity, drive] = first;
         let [loads, bond_work, before, now] = second;
         let [freed_before, freed, ..] = third;
-        let [field_work, potential_before, potential, _] = fourth;
+        let [field_work, potential_before, potential, boundary] = fourth;
         let channels = |[normal, tangential, rolling, twisting]: [f64; 4]| Channels {
             normal,
             tangential,
@@ -216,6 +227,7 @@ impl EnergyLedger {
                 freed_before,
                 freed,
             },
+            boundary,
             fields: Falling {
                 work: field_work,
                 potential_before,
@@ -337,6 +349,7 @@ impl Simulation {
                 ledger.gravity += kick * m * grain.velocity.dot(&self.gravity);
             }
         }
+        let cell = self.cell();
         for (chunk, k) in self.reach.pairs() {
             let (i, j) = (chunk.i[k] as usize, chunk.j[k] as usize);
             let slot = &chunk.slots[k * rows..][..rows];
@@ -344,9 +357,12 @@ impl Simulation {
                 continue;
             }
             let (a, b) = (&self.grains.place[i], &self.grains.place[j]);
-            let normal = self.domain.nearest_image(vector(a) - vector(b)).normalize();
+            let (branch, image) = cell.nearest(vector(a) - vector(b));
+            let normal = branch.normalize();
+            ledger.boundary += kick * vector(&slot[0]).dot(&image);
             let (a, b) = (&moving[i], &moving[j]);
-            let (u, turns, spin) = (a.velocity - b.velocity, a.turn + b.turn, a.spin - b.spin);
+            let u = a.velocity - b.velocity - image;
+            let (turns, spin) = (a.turn + b.turn, a.spin - b.spin);
             book(&mut ledger.work, slot, &normal, kick, [u, turns, spin]);
             // Work on a fixed grain is not work on a free one: somebody moved it.
             for (side, sign) in [(a, 1.0), (b, -1.0)] {
@@ -367,6 +383,10 @@ impl Simulation {
         }
         for Bond { rows, pull, .. } in self.bonds.whole() {
             let sides = rows.map(|row| &moving[row as usize]);
+            let [a, b] = rows.map(|row| vector(&self.grains.place[row as usize]));
+            let passed_on = kick * pull.force.dot(&cell.nearest(a - b).1);
+            ledger.boundary += passed_on;
+            ledger.bonds.work -= passed_on;
             for ((side, sign), moment) in sides.into_iter().zip([1.0, -1.0]).zip(&pull.moments) {
                 let power = sign * pull.force.dot(&side.velocity) + moment.dot(&side.spin);
                 ledger.bonds.work += kick * power;

@@ -9,6 +9,7 @@
 //! Results are the same bits for any number of threads and after a restart from a [`Record`].
 
 mod bonds;
+mod boundaries;
 mod checkpoint;
 mod chunk;
 pub mod contact;
@@ -45,6 +46,7 @@ pub mod walls;
 pub use bonds::{
     BondCount, BondRule, BondState, BondStress, Cement, Cluster, Clusters, Section as BondSection,
 };
+pub use boundaries::{BoxMotion, Edge, Outflow, Outlet, StressServo};
 pub use contact::{
     Cohesion, ContactLaw, Damping, Elasticity, Epsd, Hertz, Hooke, Jkr, LawTable, Laws, Lever,
     Mindlin, Normal, Rolling, ShapeParameter, SpringStiffness, Tangential, TangentialSpring,

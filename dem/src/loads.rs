@@ -154,7 +154,7 @@ fn add(row: &mut [[f64; 4]; 2], force: &Vector3<f64>, moment: &Vector3<f64>) {
 impl Simulation {
     /// Lays the loads of the present positions; bonds stretch by a step of this length (s).
     pub(crate) fn evaluate_loads(&mut self, stretch: f64) {
-        let grains = &self.grains;
+        let (grains, cell) = (&self.grains, self.cell());
         if !self.looks_up() && !self.fields.has_fields() {
             self.loads.clear(0);
             return;
@@ -165,8 +165,7 @@ impl Simulation {
             self.fields.evaluate(grains, self.parallel);
             self.loads.add_fields(&self.fields.pulls);
         }
-        self.bonds
-            .evaluate(grains, &self.domain, stretch, self.parallel);
+        self.bonds.evaluate(grains, &cell, stretch, self.parallel);
         self.loads.add_bonds(&self.bonds);
     }
 

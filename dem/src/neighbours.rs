@@ -9,7 +9,7 @@
 //! The list holds all pairs closer than `R_i + R_j + skin`, each once, i < j, ordered by i; it is valid
 //! as long as no two grains can have approached by more than the skin: see `validity.rs`.
 
-use crate::domain::{Domain, Images};
+use crate::domain::{Cell, Domain, Images};
 use crate::grains::Grains;
 use crate::grid::Grid;
 use crate::validity::{Allowance, Watch};
@@ -94,15 +94,15 @@ const LEVELS: usize = 24;
 
 impl Neighbours {
     /// Sorts the grains and lists all pairs closer than `R_i + R_j + skin`.
-    pub fn build(&mut self, grains: &mut Grains, domain: &Domain, skin: f64, parallel: bool) {
+    pub fn build(&mut self, grains: &mut Grains, cell: &Cell, skin: f64, parallel: bool) {
         let n = grains.len();
         for x in &mut grains.place[..n] {
-            let wrapped = domain.wrap(crate::grains::vector(x));
+            let (wrapped, _) = cell.wrap(crate::grains::vector(x));
             (x[0], x[1], x[2]) = (wrapped.x, wrapped.y, wrapped.z);
         }
-        self.sort(grains, domain, skin);
+        self.sort(grains, &cell.domain, skin);
         self.lay_rows(grains);
-        self.find_pairs(grains, domain, skin, parallel);
+        self.find_pairs(grains, cell, skin, parallel);
         self.age = 0.0;
     }
 
@@ -274,7 +274,7 @@ impl Neighbours {
         }
     }
 
-    fn find_pairs(&mut self, grains: &Grains, domain: &Domain, skin: f64, parallel: bool) {
+    fn find_pairs(&mut self, grains: &Grains, cell: &Cell, skin: f64, parallel: bool) {
         let rows = self.rows.len();
         let mut parts = std::mem::take(&mut self.build.parts);
         let threads = if parallel {
@@ -291,7 +291,7 @@ impl Neighbours {
             levels: &self.levels,
             first: &self.build.cell_first,
             grains,
-            images: Images::of(domain),
+            images: Images::of(cell),
             skin,
         };
         let mut total = 0;
@@ -388,27 +388,56 @@ impl Finder<'_> {
 
     /// Lists the grains behind i in cells of a level.
     fn scan(&self, level: &Level, i: u32, around: &[Vec<usize>; 3], partner: &mut Vec<u32>) {
+        let nx = level.grid.cells[0];
+        let xi = &self.grains.place[i as usize];
+        for &slow in &around[2] {
+            for &fast in &around[1] {
+                let row = level.first_cell + level.grid.row_at([fast, slow]) * nx;
+                // Beyond a sheared boundary partners may lie anywhere along x.
+                if self.images.moves && self.beyond_shear(level, xi, [fast, slow]) {
+                    self.scan_cells(i, [row, row + nx], partner);
+                    continue;
+                }
+                for &x in &around[0] {
+                    self.scan_cells(i, [row + x, row + x + 1], partner);
+                }
+            }
+        }
+    }
+
+    /// Whether a row of cells may be seen from a point through the boundary whose images are shifted.
+    fn beyond_shear(&self, level: &Level, x: &[f64; 4], [fast, slow]: [usize; 2]) -> bool {
+        let Some(axis) = self.images.sheared() else {
+            return false;
+        };
+        let cell = if level.grid.across[0] == axis {
+            fast
+        } else {
+            slow
+        };
+        let (own, last) = (
+            level.grid.coordinate(axis, x[axis]),
+            level.grid.cells[axis] - 1,
+        );
+        own == 0 && cell == last || own == last && cell == 0
+    }
+
+    /// Lists the grains behind i in consecutive cells.
+    #[inline(always)]
+    fn scan_cells(&self, i: u32, [from, to]: [usize; 2], partner: &mut Vec<u32>) {
         let grains = self.grains;
         let xi = &grains.place[i as usize];
         let reach = xi[3] + self.skin;
         let held = grains.motion[i as usize][3] == 0.0;
-        let nx = level.grid.cells[0];
-        for &slow in &around[2] {
-            for &fast in &around[1] {
-                let row = level.first_cell + level.grid.row_at([fast, slow]) * nx;
-                for &x in &around[0] {
-                    let from = self.first[row + x].max(i + 1);
-                    for j in from..self.first[row + x + 1].max(from) {
-                        let xj = &grains.place[j as usize];
-                        let r2 = self.images.distance_squared(xi, xj);
-                        let near = reach + xj[3];
-                        // Two fixed grains have nothing to say to each other.
-                        let idle = held && grains.motion[j as usize][3] == 0.0;
-                        if r2 < near * near && !idle {
-                            partner.push(j);
-                        }
-                    }
-                }
+        let first = self.first[from].max(i + 1);
+        for j in first..self.first[to].max(first) {
+            let xj = &grains.place[j as usize];
+            let r2 = self.images.distance_squared(xi, xj);
+            let near = reach + xj[3];
+            // Two fixed grains have nothing to say to each other.
+            let idle = held && grains.motion[j as usize][3] == 0.0;
+            if r2 < near * near && !idle {
+                partner.push(j);
             }
         }
     }
@@ -479,7 +508,7 @@ mod tests {
 
     /// All pairs closer than a contact plus `gap`, by trying every one.
     fn close(grains: &Grains, domain: &Domain, gap: f64) -> BTreeSet<(u32, u32)> {
-        let images = Images::of(domain);
+        let images = Images::of(&(*domain).into());
         let mut pairs = BTreeSet::new();
         for i in 0..grains.len() {
             for j in i + 1..grains.len() {
@@ -512,7 +541,7 @@ mod tests {
                 let (setup, domain) = cloud(3, 1200, ratio, periodic);
                 let mut grains = Grains::new(&setup);
                 let mut list = Neighbours::default();
-                list.build(&mut grains, &domain, SKIN, false);
+                list.build(&mut grains, &domain.into(), SKIN, false);
                 assert!(list.levels.len() >= levels, "{}", list.levels.len());
                 assert!(levels > 1 || list.levels.len() == 1);
                 let expected = close(&grains, &domain, SKIN);
@@ -540,7 +569,7 @@ mod tests {
             let dt = 1e-3 / ratio;
             let (mut steps, mut builds) = (0, 0);
             while builds < 4 {
-                list.build(&mut grains, &domain, SKIN, false);
+                list.build(&mut grains, &domain.into(), SKIN, false);
                 builds += 1;
                 let known = listed(&list, grains.len());
                 loop {

@@ -46,10 +46,11 @@ impl Simulation {
 
     pub(crate) fn grain_sample(&self, i: usize) -> GrainSample {
         let (velocity, spin) = self.synchronised(i);
+        let (position, image) = self.cell().wrap(vector(&self.grains.place[i]));
         GrainSample {
             id: self.grains.id[i],
-            position: self.domain.wrap(vector(&self.grains.place[i])),
-            velocity,
+            position,
+            velocity: velocity - image,
             spin,
             radius: self.grains.place[i][3],
             mass: self.grains.mass[i],
@@ -75,11 +76,11 @@ impl Simulation {
         into.grains
             .extend((0..self.grains.len()).map(|i| self.grain_sample(i)));
         into.contacts.clear();
-        let rows = self.slot_rows();
+        let (rows, cell) = (self.slot_rows(), self.cell());
         for (chunk, k) in self.reach.pairs() {
             let (i, j) = (chunk.i[k] as usize, chunk.j[k] as usize);
             let (a, b) = (&self.grains.place[i], &self.grains.place[j]);
-            let apart = self.domain.nearest_image(vector(a) - vector(b));
+            let (apart, _) = cell.nearest(vector(a) - vector(b));
             let (distance, radii) = (apart.norm(), a[3] + b[3]);
             if distance >= radii && !self.holds(&self.history_of(chunk, k)) {
                 continue;
@@ -119,11 +120,11 @@ impl Simulation {
             energy.translation += 0.5 * m * v.norm_squared();
             energy.rotation += 0.5 * SPHERE_INERTIA * m * r * r * w.norm_squared();
         }
-        let width = self.layout.history;
+        let (width, cell) = (self.layout.history, self.cell());
         for (chunk, k) in self.reach.pairs() {
             let (i, j) = (chunk.i[k] as usize, chunk.j[k] as usize);
             let (a, b) = (&self.grains.place[i], &self.grains.place[j]);
-            let apart = self.domain.nearest_image(vector(a) - vector(b)).norm();
+            let apart = cell.nearest(vector(a) - vector(b)).0.norm();
             let history = self.history_of(chunk, k);
             let pair = self.pair(i, self.grains.material[j]);
             let curvature = self.grains.turn[i][3] + self.grains.turn[j][3];

@@ -83,7 +83,7 @@ impl Simulation {
     }
 
     /// Momentum of a free grain as the integrator holds it.
-    fn held_momentum(&self, i: usize) -> Vector3<f64> {
+    pub(crate) fn held_momentum(&self, i: usize) -> Vector3<f64> {
         if self.grains.is_fixed(i) {
             Vector3::zeros()
         } else {

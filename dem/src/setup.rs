@@ -326,7 +326,9 @@ pub(crate) fn check_box(domain: &Domain, largest: f64, skin: f64) -> Result<(), 
     let least = 2.0 * (2.0 * largest + skin);
     for (k, axis) in ['x', 'y', 'z'].into_iter().enumerate() {
         let length = domain.lengths()[k];
-        check(&format!("domain.{axis}"), length, "> 0 m", |v| v > 0.0)?;
+        if !(length > 0.0 && length.is_finite()) {
+            check(&format!("domain.{axis}"), length, "> 0 m", |v| v > 0.0)?;
+        }
         if domain.periodic[k] && length < least {
             return Err(SetupError::NarrowDomain {
                 axis,

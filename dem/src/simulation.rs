@@ -1,6 +1,7 @@
 //! The simulation: one state, one step.
 
 use crate::bonds::Bonds;
+use crate::boundaries::{Drain, MovingBox};
 use crate::contact::composition::Visitor;
 use crate::contact::{ContactLaw, Interaction, LawTable, Step};
 use crate::contacts::Touching;
@@ -26,7 +27,7 @@ use nalgebra::Vector3;
 use std::sync::Arc;
 
 /// The step no longer follows the motion.
-#[derive(Clone, Copy, Debug, PartialEq, thiserror::Error)]
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
 pub enum Diverged {
     /// A position is no longer a number.
     #[error(
@@ -57,6 +58,14 @@ pub enum Diverged {
         timestep: f64,
         /// A step that would do.
         remedy: Remedy,
+    },
+    /// A moving box has become too narrow.
+    #[error("at t = {time:e} s: {narrow}")]
+    Narrow {
+        /// When (s).
+        time: f64,
+        /// Which axis, and what it must be.
+        narrow: Box<SetupError>,
     },
     /// Grains move against each other by more than the search can follow.
     #[error(
@@ -150,6 +159,8 @@ pub struct Simulation {
     pub(crate) loads: Loads,
     pub(crate) bonds: Bonds,
     pub(crate) fields: Gravity,
+    pub(crate) moving_box: MovingBox,
+    pub(crate) drain: Drain,
     /// Rows by grain number, as of the last build of lists with loads.
     pub(crate) places: Places,
     /// Histories on their way to new lists.
@@ -247,6 +258,8 @@ impl Simulation {
             loads: Loads::default(),
             bonds: Bonds::default(),
             fields: Gravity::default(),
+            moving_box: MovingBox::default(),
+            drain: Drain::default(),
             places: Places::default(),
             touching: Touching::default(),
             fastest: Vec::new(),
@@ -299,12 +312,16 @@ impl Simulation {
             kick,
         );
         self.keep_accounts(kick);
+        self.move_box();
         self.steps += 1;
         self.steps_since_start += 1;
         self.follow_schedule();
         self.current = false;
         self.springs_current = false;
-        self.keep_lists()
+        self.keep_lists()?;
+        self.steer_box();
+        self.let_out();
+        Ok(())
     }
 
     /// Evaluates the forces of the present positions for an observer, remembering the springs as
@@ -375,7 +392,8 @@ impl Simulation {
         if pass != Pass::Motion {
             self.evaluate_loads(step.stretch);
         }
-        let (g, grains) = (self.gravity, &mut self.grains);
+        let (g, images) = (self.gravity, Images::of(&self.cell()));
+        let grains = &mut self.grains;
         // SAFETY: a sweep writes the rows of each chunk on one thread, those of grains that other
         // chunks read after all of them are through (`sweep.rs`).
         let rows = unsafe { Rows::of(&mut grains.place, &mut grains.motion, &mut grains.turn) };
@@ -386,7 +404,7 @@ impl Simulation {
             field: Field {
                 rows,
                 material: &grains.material,
-                images: Images::of(&self.domain),
+                images,
                 lever,
                 hold: self.hold,
                 step,
@@ -426,8 +444,10 @@ impl Simulation {
         self.reach.age += self.timestep;
         self.reach.steps += 1;
         let (dt, mut farthest) = (self.timestep, 0.0);
+        // Of two grains seen through a moving boundary each takes half of its speed.
+        let images = 0.5 * self.moving_box.drift.fastest();
         for (r, fastest) in self.fastest.iter().enumerate() {
-            let travel = dt * fastest.sqrt();
+            let travel = dt * (fastest.sqrt() + images);
             self.list.travel[r] += travel;
             self.reach.travel[r] += travel;
             // Not a number stays.
@@ -442,6 +462,7 @@ impl Simulation {
 
     /// Renews the lists where grains may have outrun them.
     fn keep_lists(&mut self) -> Result<(), Diverged> {
+        self.check_width()?;
         if self.list.outdated(self.skin) {
             self.outlived(self.list.age)?;
             self.rebuild();
@@ -566,9 +587,10 @@ impl Simulation {
     /// Builds all lists anew; `remaining` says where a grain of the old lists is now, if it is.
     pub(crate) fn rebuild_from(&mut self, remaining: &dyn Fn(u32) -> u32) {
         self.fold_impulses();
-        let listed = self.skin + self.hold;
+        self.wrap_grains();
+        let (cell, listed) = (self.cell(), self.skin + self.hold);
         self.list
-            .build(&mut self.grains, &self.domain, listed, self.parallel);
+            .build(&mut self.grains, &cell, listed, self.parallel);
         let list = &self.list;
         let place = |old: u32| match remaining(old) {
             GONE => GONE,
@@ -602,7 +624,7 @@ impl Simulation {
         let making = Making {
             grains: &self.grains,
             list: &self.list,
-            images: Images::of(&self.domain),
+            images: Images::of(&self.cell()),
             width: self.layout.history,
             hold: self.hold,
         };
@@ -646,6 +668,7 @@ impl Simulation {
 
     /// Sets the velocities of all free grains; spins and contacts stay.
     pub fn give_velocity(&mut self, mut f: impl FnMut(&GrainSample) -> Vector3<f64>) {
+        self.wrap_grains();
         let samples = self.samples();
         for (i, sample) in samples.iter().enumerate() {
             if sample.fixed {

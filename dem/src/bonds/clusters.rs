@@ -3,7 +3,7 @@
 //! Union–find over the whole bonds. Each grain keeps the way from the root of its cluster to itself, so
 //! that clusters across periodic boundaries have one shape.
 
-use crate::domain::Domain;
+use crate::domain::Cell;
 use crate::grains::{Grains, SPHERE_INERTIA, vector};
 use crate::simulation::Simulation;
 use nalgebra::Vector3;
@@ -158,10 +158,10 @@ impl Sums {
         self.high = self.high.sup(&at.add_scalar(r));
     }
 
-    fn finish(mut self, root: Vector3<f64>, domain: &Domain) -> Cluster {
+    fn finish(mut self, root: Vector3<f64>, cell: &Cell) -> Cluster {
         let mass = self.cluster.mass;
         let center = self.moment / mass;
-        self.cluster.center = domain.wrap(root + center);
+        self.cluster.center = cell.wrap(root + center).0;
         self.cluster.velocity /= mass;
         self.cluster.extent = self.high - self.low;
         let spread = self.second / mass - center.norm_squared();
@@ -174,13 +174,13 @@ impl Simulation {
     /// What hangs together by whole bonds now.
     pub fn clusters(&mut self) -> Clusters {
         self.observe();
-        let (grains, domain) = (&self.grains, &self.domain);
+        let (grains, cell) = (&self.grains, self.cell());
         let n = grains.len();
         let mut forest = Forest::new(n);
         for bond in self.bonds.whole() {
             let [i, j] = bond.rows.map(|row| row as usize);
             let apart = vector(&grains.place[i]) - vector(&grains.place[j]);
-            forest.join(i, j, domain.nearest_image(apart));
+            forest.join(i, j, cell.nearest(apart).0);
         }
         let mut sums = vec![Sums::empty(); n];
         let roots: Vec<usize> = (0..n)
@@ -196,7 +196,7 @@ impl Simulation {
         let mut list: Vec<(usize, Cluster)> = (0..n)
             .zip(sums)
             .filter(|(_, s)| s.cluster.grains > 0)
-            .map(|(root, s)| (root, s.finish(vector(&grains.place[root]), domain)))
+            .map(|(root, s)| (root, s.finish(vector(&grains.place[root]), &cell)))
             .collect();
         list.sort_by(|(_, a), (_, b)| b.mass.total_cmp(&a.mass).then(a.first.cmp(&b.first)));
         let mut number = vec![0; n];

@@ -78,7 +78,8 @@ impl Simulation {
         crate::setup::check_box(&self.domain, largest, rule.gap * largest)?;
         // A list of its own, with the gap for a skin: that of the run must stay what it is.
         let (mut sorted, mut list) = (grains.clone(), Neighbours::default());
-        list.build(&mut sorted, &self.domain, rule.gap * largest, false);
+        let cell = self.cell();
+        list.build(&mut sorted, &cell, rule.gap * largest, false);
         let known: BTreeSet<[u32; 2]> = self.bonds.list.iter().map(|b| b.ids).collect();
         let bonds =
             |g: usize| rule.materials.is_empty() || rule.materials.contains(&sorted.material[g]);
@@ -86,9 +87,9 @@ impl Simulation {
         for i in 0..sorted.len() {
             for &j in list.partners(i) {
                 let (x, y) = (&sorted.place[i], &sorted.place[j as usize]);
-                let branch = self.domain.nearest_image(vector(x) - vector(y));
+                let (branch, _) = cell.nearest(vector(x) - vector(y));
                 let (distance, sum) = (branch.norm(), x[3] + y[3]);
-                let point = self.domain.wrap(vector(x) - branch * (x[3] / sum));
+                let point = cell.wrap(vector(x) - branch * (x[3] / sum)).0;
                 let mut ids = [sorted.id[i], sorted.id[j as usize]];
                 ids.sort_unstable();
                 if distance - sum <= 0.5 * rule.gap * sum
@@ -153,8 +154,8 @@ impl Simulation {
     /// Numbers of the grains of all bonds, the lower one first, with their states and contact points.
     pub fn bonds(&mut self) -> Vec<([u32; 2], BondState, Vector3<f64>)> {
         self.observe();
-        let (grains, domain) = (&self.grains, &self.domain);
-        let show = |bond: &Bond| (bond.ids, bond.state, bond.middle(grains, domain));
+        let (grains, cell) = (&self.grains, self.cell());
+        let show = |bond: &Bond| (bond.ids, bond.state, bond.middle(grains, &cell));
         self.bonds.list.iter().map(show).collect()
     }
 }

@@ -18,7 +18,7 @@ pub use cement::{Cement, Section};
 pub use clusters::{Cluster, Clusters};
 pub use formation::BondRule;
 
-use crate::domain::Domain;
+use crate::domain::Cell;
 use crate::grains::{Grains, vector};
 use crate::places::Places;
 use crate::population::GONE;
@@ -119,11 +119,11 @@ impl Bonds {
 
     /// Stretches all whole bonds by a step of this length (s), breaks those that have to, and says
     /// what the others do.
-    pub fn evaluate(&mut self, grains: &Grains, domain: &Domain, step: f64, parallel: bool) {
+    pub fn evaluate(&mut self, grains: &Grains, cell: &Cell, step: f64, parallel: bool) {
         let cements = &self.cements;
         let evaluate = |bonds: &mut [Bond]| {
             for bond in bonds.iter_mut().filter(|b| b.state == BondState::Whole) {
-                bond.advance(&cements[bond.cement as usize], grains, domain, step);
+                bond.advance(&cements[bond.cement as usize], grains, cell, step);
             }
         };
         if parallel {
@@ -158,8 +158,8 @@ impl Bonds {
 }
 
 impl Bond {
-    fn advance(&mut self, cement: &Cement, grains: &Grains, domain: &Domain, step: f64) {
-        let at = self.relative(grains, domain);
+    fn advance(&mut self, cement: &Cement, grains: &Grains, cell: &Cell, step: f64) {
+        let at = self.relative(grains, cell);
         let section = cement.section(at.radii[0], at.radii[1]);
         if step > 0.0 {
             self.strain = self.strain.advanced(&at, step);
@@ -178,31 +178,32 @@ impl Bond {
         self.pull = Pull::default();
     }
 
-    fn relative(&self, grains: &Grains, domain: &Domain) -> Relative {
+    fn relative(&self, grains: &Grains, cell: &Cell) -> Relative {
         let [i, j] = self.rows.map(|row| row as usize);
         let (a, b) = (&grains.place[i], &grains.place[j]);
         let spin = |g: usize| vector(&grains.turn[g]) * grains.turn[g][3];
+        let (branch, image) = cell.nearest(vector(a) - vector(b));
         Relative {
-            branch: domain.nearest_image(vector(a) - vector(b)),
-            velocity: vector(&grains.motion[i]) - vector(&grains.motion[j]),
+            branch,
+            velocity: vector(&grains.motion[i]) - vector(&grains.motion[j]) - image,
             spins: [spin(i), spin(j)],
             radii: [a[3], b[3]],
         }
     }
 
     /// Elastic energy (J).
-    pub fn energy(&self, cements: &[Cement], grains: &Grains, domain: &Domain) -> f64 {
-        let at = self.relative(grains, domain);
+    pub fn energy(&self, cements: &[Cement], grains: &Grains, cell: &Cell) -> f64 {
+        let at = self.relative(grains, cell);
         let section = cements[self.cement as usize].section(at.radii[0], at.radii[1]);
         self.strain.energy(&section, &at.branch)
     }
 
     /// Point of the line of centres that divides it as the radii do, in the box (m).
-    fn middle(&self, grains: &Grains, domain: &Domain) -> Vector3<f64> {
-        let at = self.relative(grains, domain);
+    fn middle(&self, grains: &Grains, cell: &Cell) -> Vector3<f64> {
+        let at = self.relative(grains, cell);
         let [a, b] = at.radii;
         let own = vector(&grains.place[self.rows[0] as usize]);
-        domain.wrap(own - at.branch * (a / (a + b)))
+        cell.wrap(own - at.branch * (a / (a + b))).0
     }
 }
 
@@ -210,11 +211,12 @@ impl Simulation {
     /// Takes away all whole bonds whose contact point lies in a region, and says how many: a crack.
     pub fn cut_bonds(&mut self, within: &Region) -> usize {
         self.forget_observation();
-        let (grains, domain, cements) = (&self.grains, &self.domain, &self.bonds.cements);
+        let cell = self.cell();
+        let (grains, cements) = (&self.grains, &self.bonds.cements);
         let mut count = 0;
         for bond in &mut self.bonds.list {
-            if bond.state == BondState::Whole && within.contains(&bond.middle(grains, domain)) {
-                let energy = bond.energy(cements, grains, domain);
+            if bond.state == BondState::Whole && within.contains(&bond.middle(grains, &cell)) {
+                let energy = bond.energy(cements, grains, &cell);
                 bond.end(BondState::Cut, energy);
                 count += 1;
             }
@@ -231,9 +233,9 @@ impl Simulation {
     /// All whole bonds at this instant, in the order in which they were made; grains by their rows.
     pub(crate) fn bond_samples(&self, into: &mut Vec<BondSample>) {
         into.clear();
-        let (grains, domain) = (&self.grains, &self.domain);
+        let (grains, cell) = (&self.grains, self.cell());
         into.extend(self.bonds.whole().map(|bond| {
-            let at = bond.relative(grains, domain);
+            let at = bond.relative(grains, &cell);
             let [a, b] = at.radii;
             let section = self.bonds.cements[bond.cement as usize].section(a, b);
             BondSample {
@@ -250,8 +252,8 @@ impl Simulation {
 
     /// Elastic energy of all bonds (J).
     pub(crate) fn bond_energy(&self) -> f64 {
-        let (cements, grains, domain) = (&self.bonds.cements, &self.grains, &self.domain);
-        let energy = |bond: &Bond| bond.energy(cements, grains, domain);
+        let (cements, grains, cell) = (&self.bonds.cements, &self.grains, self.cell());
+        let energy = |bond: &Bond| bond.energy(cements, grains, &cell);
         self.bonds.whole().map(energy).sum()
     }
 }
