@@ -13,6 +13,7 @@ pub mod cost;
 pub mod failure;
 pub mod interruption;
 pub mod journal;
+pub mod mesh_files;
 pub mod pareto;
 pub mod plan;
 pub mod progress;
