@@ -24,12 +24,14 @@ pub const CHECKPOINT: &str = "checkpoint.h5";
 pub const LOG: &str = "log.txt";
 
 /// Every file that a run, a campaign or a comparison writes.
-const OWN_FILES: [&str; 18] = [
+const OWN_FILES: [&str; 20] = [
     SCENE,
     REPORT,
     RESULTS,
     CHECKPOINT,
     LOG,
+    "grains.vtkhdf",
+    "contacts.vtkhdf",
     "profile.csv",
     "energy.csv",
     "trajectory.csv",
@@ -294,7 +296,7 @@ fn remove_old_run(path: &Path) -> std::io::Result<()> {
             _ => {}
         }
     }
-    Ok(())
+    crate::frames::remove(path)
 }
 
 fn differing_keys(a: &toml::Table, b: &toml::Table, path: &str) -> Vec<String> {

@@ -4,6 +4,7 @@ use super::{Findings, Under};
 use super::{impact_scales, step};
 use crate::cost::Cost;
 use crate::failure::Failure;
+use crate::frames::Frames;
 use crate::progress::Bar;
 use crate::scene::{CohesionKind, Pace, Parts, RollingKind, Scene, SceneError, TangentialKind};
 use crate::start_file::{self, StartError};
@@ -155,19 +156,23 @@ pub fn run(bed: &Bed, under: &mut Under) -> Result<Ran, Failure> {
     under.begin()?;
     let bar = Bar::new(&under.scene.name);
     let mut snapshot = Snapshot::default();
+    let frames = Frames::new(under.directory.path(), bed.pace.steps, bed.pace.frames);
     if simulation.steps_done() == 0 {
         rows.push(look(&mut simulation, &mut snapshot, bed.floor));
+        frames.take(&mut simulation, &mut snapshot)?;
     }
     while simulation.steps_done() < bed.pace.steps {
         let done = simulation.steps_done();
         let row = next_row(done, bed);
         let next = row.min(done + STEPS_PER_LOOK);
+        let next = frames.next(done).map_or(next, |frame| frame.min(next));
         simulation
             .advance(next - done)
             .map_err(|error| Failure::Run(error.to_string()))?;
         if next == row {
             rows.push(look(&mut simulation, &mut snapshot, bed.floor));
         }
+        frames.take(&mut simulation, &mut snapshot)?;
         bar.set(next as f64 / bed.pace.steps as f64);
         under.checkpoint("steps", || {
             let mut record = simulation.checkpoint();
@@ -177,6 +182,7 @@ pub fn run(bed: &Bed, under: &mut Under) -> Result<Ran, Failure> {
         })?;
     }
     bar.clear();
+    frames.join()?;
     simulation.snapshot(&mut snapshot);
     Ok(Ran {
         rows,

@@ -19,16 +19,18 @@ pub struct Pace {
     pub steps: u64,
     /// Steps between two rows of `energy.csv`.
     pub record_every: u64,
+    /// Instants in `grains.vtkhdf` and `contacts.vtkhdf` besides the start; none writes no files.
+    pub frames: u64,
 }
 
 impl Pace {
-    /// From the keys `timestep`, `coarse_graining`, `steps` or `duration`, `record_every`.
+    /// From the keys `timestep`, `coarse_graining`, `steps` or `duration`, `record_every` and `frames`.
     pub fn of(
         timestep: f64,
         coarse_graining: f64,
         steps: Option<u64>,
         duration: Option<f64>,
-        record_every: u64,
+        [record_every, frames]: [u64; 2],
     ) -> Pace {
         let timestep = timestep * coarse_graining;
         let wanted = match (steps, duration) {
@@ -40,6 +42,7 @@ impl Pace {
             timestep,
             steps: wanted,
             record_every,
+            frames,
         }
     }
 

@@ -46,6 +46,10 @@ pub struct ChuteScene {
     /// Steps between two rows of `energy.csv`.
     #[schemars(extend("minimum" = 1, "maximum" = 1000000000))]
     pub record_every: u64,
+    /// Instants in `grains.vtkhdf` and `contacts.vtkhdf` besides the start, for ParaView; 0 writes none.
+    #[serde(default)]
+    #[schemars(extend("minimum" = 0, "maximum" = 100000))]
+    pub frames: u64,
     /// The contact law of the grains.
     pub contact: LawKeys,
 }
@@ -58,7 +62,7 @@ impl ChuteScene {
             self.coarse_graining,
             self.steps,
             self.duration,
-            self.record_every,
+            [self.record_every, self.frames],
         )
     }
 

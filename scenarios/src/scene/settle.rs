@@ -40,6 +40,10 @@ pub struct SettleScene {
     /// Steps between two rows of `energy.csv`.
     #[schemars(extend("minimum" = 1, "maximum" = 1000000000))]
     pub record_every: u64,
+    /// Instants in `grains.vtkhdf` and `contacts.vtkhdf` besides the start, for ParaView; 0 writes none.
+    #[serde(default)]
+    #[schemars(extend("minimum" = 0, "maximum" = 100000))]
+    pub frames: u64,
     /// The grains.
     pub grains: SettleGrains,
     /// The floor, between four walls.
@@ -86,7 +90,7 @@ impl SettleScene {
             self.coarse_graining,
             self.steps,
             self.duration,
-            self.record_every,
+            [self.record_every, self.frames],
         )
     }
 
