@@ -46,11 +46,17 @@ impl Frames {
             return None;
         }
         let at = (u128::from(done) * u128::from(self.count) / u128::from(self.steps)) as u64;
-        (at..=self.count).map(|frame| self.step_of(frame)).find(|&step| step > done)
+        (at..=self.count)
+            .map(|frame| self.step_of(frame))
+            .find(|&step| step > done)
     }
 
     /// Writes a frame if one is due at this step; `snapshot` is room for it.
-    pub fn take(&self, simulation: &mut Simulation, snapshot: &mut Snapshot) -> Result<(), Failure> {
+    pub fn take(
+        &self,
+        simulation: &mut Simulation,
+        snapshot: &mut Snapshot,
+    ) -> Result<(), Failure> {
         let step = simulation.steps_done();
         let due = step == 0 || step.checked_sub(1).and_then(|s| self.next(s)) == Some(step);
         if self.count == 0 || !due {
@@ -60,7 +66,10 @@ impl Frames {
         let clusters = simulation.clusters();
         let folder = self.directory.join(FOLDER);
         fs::create_dir_all(&folder).map_err(|error| {
-            Failure::Run(format!("cannot make the folder {}: {error}", folder.display()))
+            Failure::Run(format!(
+                "cannot make the folder {}: {error}",
+                folder.display()
+            ))
         })?;
         let frames = [grains(snapshot, &clusters), contacts(snapshot)];
         for (series, frame) in SERIES.into_iter().zip(frames) {
@@ -100,7 +109,9 @@ pub fn remove(directory: &Path) -> std::io::Result<()> {
         return Ok(());
     }
     let own = |name: &str| {
-        let series = SERIES.iter().any(|series| name.starts_with(&format!("{series}_")));
+        let series = SERIES
+            .iter()
+            .any(|series| name.starts_with(&format!("{series}_")));
         series && (name.ends_with(".vtkhdf") || name.ends_with(".partial"))
     };
     for entry in fs::read_dir(&folder)? {
@@ -138,14 +149,16 @@ pub fn grains(snapshot: &Snapshot, clusters: &Clusters) -> Frame {
     let scalars = |read: fn(&GrainSample) -> f64| {
         Values::Scalars(order.iter().map(|&g| read(&snapshot.grains[g])).collect())
     };
-    let counts = |read: &dyn Fn(usize) -> i64| {
-        Values::Counts(order.iter().map(|&g| read(g)).collect())
-    };
+    let counts =
+        |read: &dyn Fn(usize) -> i64| Values::Counts(order.iter().map(|&g| read(g)).collect());
     let first = |g: usize| i64::from(clusters.list[clusters.of[g]].first);
     Frame {
         time: snapshot.time,
         cells: Cells::Points,
-        points: order.iter().map(|&g| snapshot.grains[g].position.into()).collect(),
+        points: order
+            .iter()
+            .map(|&g| snapshot.grains[g].position.into())
+            .collect(),
         fields: vec![
             field("id", "1", counts(&|g| i64::from(snapshot.grains[g].id))),
             field("radius", "m", scalars(|g| g.radius)),
@@ -155,7 +168,11 @@ pub fn grains(snapshot: &Snapshot, clusters: &Clusters) -> Frame {
             field("force", "N", vectors(order.iter().map(|&g| force[g]))),
             field("contacts", "1", counts(&|g| touching[g])),
             field("cluster", "1", counts(&first)),
-            field("fixed", "1", counts(&|g| i64::from(snapshot.grains[g].fixed))),
+            field(
+                "fixed",
+                "1",
+                counts(&|g| i64::from(snapshot.grains[g].fixed)),
+            ),
         ],
     }
 }
@@ -229,7 +246,11 @@ pub fn contacts(snapshot: &Snapshot) -> Frame {
     Frame {
         time: snapshot.time,
         cells: Cells::Lines,
-        points: links.iter().flat_map(|link| link.ends).map(Into::into).collect(),
+        points: links
+            .iter()
+            .flat_map(|link| link.ends)
+            .map(Into::into)
+            .collect(),
         fields: vec![
             field("force", "N", vectors(links.iter().map(|link| link.force))),
             field("overlap", "m", scalars(|link| link.overlap)),
