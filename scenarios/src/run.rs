@@ -3,6 +3,7 @@
 pub mod bagnold;
 pub mod bed;
 pub mod chute;
+pub mod energy_table;
 pub mod grain_table;
 pub mod impact;
 pub mod impact_scales;

@@ -198,6 +198,79 @@ fn grains_settle_the_same_way_on_any_number_of_threads() {
 }
 
 #[test]
+fn a_ledger_accounts_for_the_energy_of_a_bed_and_changes_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let epsd = "contact.rolling=epsd contact.rolling_friction=0.2 contact.rolling_damping=0.3";
+    let start = |out: &str, threads: &str, ledger: bool| {
+        let set = format!("ledger={ledger}");
+        let mut sets: Vec<&str> = epsd.split(' ').collect();
+        sets.push(&set);
+        let mut arguments = run("settle", out, &sets);
+        arguments.extend(["--threads", threads]);
+        arguments.extend(SMALL);
+        arguments
+            .iter()
+            .map(|a| (*a).to_owned())
+            .collect::<Vec<_>>()
+    };
+    let go = |arguments: &[String]| {
+        let arguments: Vec<&str> = arguments.iter().map(String::as_str).collect();
+        succeed(folder.path(), &arguments);
+    };
+    go(&start("without", "1", false));
+    go(&start("one", "1", true));
+    assert_eq!(hash(&at("one")), hash(&at("without")));
+
+    let (header, rows) = table(&at("one/energy.csv"));
+    let column = |name: &str| header.iter().position(|h| h == name).unwrap();
+    let sum = |row: &[f64], names: &[&str]| names.iter().map(|n| row[column(n)]).sum::<f64>();
+    let held = [
+        "kinetic_energy",
+        "normal",
+        "tangential",
+        "rolling",
+        "twisting",
+        "cohesion",
+    ];
+    let lost = [
+        "normal_loss",
+        "tangential_loss",
+        "rolling_loss",
+        "twisting_loss",
+    ];
+    let before = sum(&rows[0], &held);
+    let last = rows.last().unwrap();
+    let fall = |row: &[f64]| rows[0][column("height")] - row[column("height")];
+    let weight = last[column("gravity_work")] / fall(last);
+    for row in &rows[1..] {
+        let gravity = row[column("gravity_work")];
+        let now = sum(row, &held) + sum(row, &lost);
+        assert!((now - before - gravity).abs() < 1e-10 * gravity, "{row:?}");
+        assert!(row[column("ledger_error")] < 1e-11, "{row:?}");
+        // Gravity's work is that of the centre of mass.
+        assert!((gravity - weight * fall(row)).abs() < 2e-3 * gravity);
+    }
+    for channel in &lost[..3] {
+        assert!(last[column(channel)] > 0.0, "{channel}: {last:?}");
+    }
+    let energy = summary(&at("one"))["ledger"]["energy"].clone();
+    assert_eq!(
+        energy["rolling_loss_J"].as_f64().unwrap(),
+        last[column("rolling_loss")]
+    );
+
+    // Two threads, stopped in between: the same rows.
+    let mut two = start("two", "2", true);
+    let arguments: Vec<&str> = two.iter().map(String::as_str).collect();
+    assert!(interrupt(folder.path(), &arguments, "two"));
+    two.push("--resume".into());
+    go(&two);
+    let bytes = |d: &str| std::fs::read(at(d).join("energy.csv")).unwrap();
+    assert_eq!(bytes("two"), bytes("one"));
+}
+
+#[test]
 fn every_law_of_the_engine_has_a_name() {
     let folder = tempfile::tempdir().unwrap();
     let elastic = "contact.youngs_modulus=1e8 contact.poissons_ratio=0.3";

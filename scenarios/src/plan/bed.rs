@@ -150,6 +150,9 @@ fn measured_rate(bed: Bed, grains: u64) -> Result<f64, Failure> {
     let steps = (PROBE / grains.max(1)).clamp(1, bed.pace.steps.max(1));
     let failed = |error: String| Failure::Run(error);
     let mut simulation = Simulation::new(bed.setup).map_err(|e| failed(e.to_string()))?;
+    if bed.ledger {
+        simulation.open_energy_ledger();
+    }
     let start = Instant::now();
     simulation
         .advance(steps)

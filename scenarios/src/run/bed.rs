@@ -1,7 +1,7 @@
 //! A bed of grains from its start through a given number of steps: what `chute` and `settle` share.
 
-use super::{Findings, Under};
-use super::{impact_scales, step};
+use super::energy_table::EnergyTable;
+use super::{Findings, Under, impact_scales, step};
 use crate::cost::Cost;
 use crate::failure::Failure;
 use crate::frames::Frames;
@@ -9,43 +9,13 @@ use crate::progress::Bar;
 use crate::scene::{CohesionKind, Pace, Parts, RollingKind, Scene, SceneError, TangentialKind};
 use crate::start_file::{self, StartError};
 use crate::summary::{Model, Quantity, Summary};
-use crate::table::Table;
 use colluvium_dem::timestep::{Choice, Conditions, Shares};
-use colluvium_dem::{ContactLaw, Grain, Partner, Record, Setup, SetupError, Simulation, Snapshot};
+use colluvium_dem::{ContactLaw, Grain, Partner, Setup, SetupError, Simulation, Snapshot};
 use nalgebra::Vector3;
 use std::path::Path;
 
 /// Steps between two looks at the clock.
 const STEPS_PER_LOOK: u64 = 50;
-
-/// Columns of `energy.csv` with their units.
-const COLUMNS: [(&str, &str); 13] = [
-    ("t", "s"),
-    ("step", "1"),
-    ("translation", "J"),
-    ("rotation", "J"),
-    ("kinetic_energy", "J"),
-    ("normal", "J"),
-    ("tangential", "J"),
-    ("rolling", "J"),
-    ("twisting", "J"),
-    ("cohesion", "J"),
-    ("height", "m"),
-    ("velocity", "m/s"),
-    ("contacts", "1"),
-];
-
-/// Numbers of a row, in the order of `COLUMNS`.
-pub type Row = [f64; COLUMNS.len()];
-
-/// Column of the step, the kinetic energies and the centre of mass.
-pub const STEP: usize = 1;
-/// See [`STEP`].
-pub const TRANSLATION: usize = 2;
-/// See [`STEP`].
-pub const KINETIC: usize = 4;
-/// See [`STEP`].
-pub const HEIGHT: usize = 10;
 
 /// A bed ready to run.
 #[derive(Debug)]
@@ -58,6 +28,8 @@ pub struct Bed {
     pub pace: Pace,
     /// Further steps at which a row is written.
     pub marks: &'static [u64],
+    /// Whether rows hold the energy ledger.
+    pub ledger: bool,
     /// Height of the floor, or of the tops of the base (m).
     pub floor: f64,
     /// Area of the floor (m²).
@@ -70,7 +42,7 @@ pub struct Bed {
 #[derive(Debug)]
 pub struct Ran {
     /// Rows of `energy.csv`.
-    pub rows: Vec<Row>,
+    pub rows: EnergyTable,
     /// The state at the end.
     pub simulation: Simulation,
     /// Grains and contacts at the end.
@@ -146,19 +118,26 @@ pub fn check(scene: &Scene, bed: Bed, timestep_key: f64) -> Result<(), Failure> 
 pub fn run(bed: &Bed, under: &mut Under) -> Result<Ran, Failure> {
     let refused = |error: SetupError| Failure::Input(error.to_string());
     let setup = bed.setup.clone();
-    let (mut simulation, mut rows) = match &under.resumed {
-        Some(saved) => (
-            Simulation::resume(setup, &saved.record).map_err(refused)?,
-            restore(&saved.record).map_err(Failure::Input)?,
-        ),
-        None => (Simulation::new(setup).map_err(refused)?, Vec::new()),
+    let mut rows = EnergyTable::new(bed.floor, bed.ledger);
+    let mut simulation = match &under.resumed {
+        Some(saved) => {
+            rows.restore(&saved.record).map_err(Failure::Input)?;
+            Simulation::resume(setup, &saved.record).map_err(refused)?
+        }
+        None => {
+            let mut simulation = Simulation::new(setup).map_err(refused)?;
+            if bed.ledger {
+                simulation.open_energy_ledger();
+            }
+            simulation
+        }
     };
     under.begin()?;
     let bar = Bar::new(&under.scene.name);
     let mut snapshot = Snapshot::default();
     let frames = Frames::new(under.directory.path(), bed.pace.steps, bed.pace.frames);
     if simulation.steps_done() == 0 {
-        rows.push(look(&mut simulation, &mut snapshot, bed.floor));
+        rows.look(&mut simulation, &mut snapshot);
         frames.take(&mut simulation, &mut snapshot)?;
     }
     while simulation.steps_done() < bed.pace.steps {
@@ -170,14 +149,13 @@ pub fn run(bed: &Bed, under: &mut Under) -> Result<Ran, Failure> {
             .advance(next - done)
             .map_err(|error| Failure::Run(error.to_string()))?;
         if next == row {
-            rows.push(look(&mut simulation, &mut snapshot, bed.floor));
+            rows.look(&mut simulation, &mut snapshot);
         }
         frames.take(&mut simulation, &mut snapshot)?;
         bar.set(next as f64 / bed.pace.steps as f64);
         under.checkpoint("steps", || {
             let mut record = simulation.checkpoint();
-            let flat = rows.iter().flatten().copied().collect();
-            record.numbers.insert("watch/rows".into(), flat);
+            rows.save(&mut record);
             record
         })?;
     }
@@ -196,46 +174,6 @@ fn next_row(done: u64, bed: &Bed) -> u64 {
     let regular = (done / bed.pace.record_every + 1) * bed.pace.record_every;
     let marks = bed.marks.iter().copied().filter(|&mark| mark > done);
     marks.fold(regular.min(bed.pace.steps), u64::min)
-}
-
-fn restore(record: &Record) -> Result<Vec<Row>, String> {
-    let flat = record.numbers("watch/rows")?;
-    let rows = flat.chunks(COLUMNS.len()).map(|row| {
-        row.try_into().map_err(|_| {
-            format!(
-                "array `watch/rows` must have rows of {} numbers",
-                COLUMNS.len()
-            )
-        })
-    });
-    rows.collect()
-}
-
-fn look(simulation: &mut Simulation, snapshot: &mut Snapshot, floor: f64) -> Row {
-    simulation.snapshot(snapshot);
-    let energy = simulation.energy();
-    let mut mass = 0.0;
-    let (mut height, mut velocity) = (0.0, 0.0);
-    for grain in snapshot.grains.iter().filter(|g| !g.fixed) {
-        mass += grain.mass;
-        height += grain.mass * grain.position.z;
-        velocity += grain.mass * grain.velocity.x;
-    }
-    [
-        simulation.time(),
-        simulation.steps_done() as f64,
-        energy.translation,
-        energy.rotation,
-        energy.kinetic(),
-        energy.normal,
-        energy.tangential,
-        energy.rolling,
-        energy.twisting,
-        energy.cohesion,
-        height / mass - floor,
-        velocity / mass,
-        snapshot.contacts.len() as f64,
-    ]
 }
 
 /// What every bed reports.
@@ -269,23 +207,23 @@ pub fn findings(
     ] {
         summary.ledger.energy.insert(name.into(), value);
     }
-    let last = ran
-        .rows
-        .last()
-        .copied()
-        .unwrap_or([f64::NAN; COLUMNS.len()]);
+    for name in ran.rows.ledger() {
+        let value = ran.rows.last(name);
+        summary.ledger.energy.insert(format!("{name}_J"), value);
+    }
     summary.put(
         "kinetic_energy",
-        Quantity::new(last[KINETIC], "J").from("at the end, translation and rotation"),
+        Quantity::new(ran.rows.last("kinetic_energy"), "J")
+            .from("at the end, translation and rotation"),
     );
+    let height = ran.rows.last("height");
     summary.put(
         "centre_of_mass_height",
-        Quantity::new(last[HEIGHT], "m")
-            .from("at the end, above the floor or the tops of the base"),
+        Quantity::new(height, "m").from("at the end, above the floor or the tops of the base"),
     );
     summary.put(
         "solid_fraction",
-        Quantity::new(solid_fraction(&ran.snapshot, bed, last[HEIGHT]), "1")
+        Quantity::new(solid_fraction(&ran.snapshot, bed, height), "1")
             .from("at the end, between a quarter and three quarters of the depth"),
     );
     summary.put(
@@ -296,13 +234,9 @@ pub fn findings(
         "largest_overlap",
         Quantity::new(ran.simulation.largest_overlap(), "R"),
     );
-    let mut table = Table::new("energy");
-    for (n, (name, unit)) in COLUMNS.into_iter().enumerate() {
-        table = table.with(name, unit, ran.rows.iter().map(|row| row[n]).collect());
-    }
     Ok(Findings {
         summary,
-        tables: vec![table],
+        tables: vec![ran.rows.table()],
         grains: Some(super::grain_table::of(&ran.snapshot)),
     })
 }

@@ -90,6 +90,7 @@ pub fn prepare(scene: &ChuteScene, threads: Threads) -> Result<Bed, Failure> {
         law,
         pace,
         marks: &MARKS,
+        ledger: scene.ledger,
     })
 }
 
@@ -222,7 +223,7 @@ fn is_bundled(scene: &Scene) -> bool {
     let Ok(mut bundled) = Scene::load("chute", &[]).map(|scene| scene.resolved) else {
         return false;
     };
-    for key in ["steps", "duration", "record_every"] {
+    for key in ["steps", "duration", "record_every", "ledger"] {
         own.remove(key);
         bundled.remove(key);
     }

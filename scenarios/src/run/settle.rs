@@ -79,6 +79,7 @@ pub fn prepare(scene: &SettleScene, threads: Threads) -> Result<Bed, Failure> {
         law,
         pace,
         marks: &[],
+        ledger: scene.ledger,
     })
 }
 

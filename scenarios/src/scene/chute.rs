@@ -46,6 +46,9 @@ pub struct ChuteScene {
     /// Steps between two rows of `energy.csv`.
     #[schemars(extend("minimum" = 1, "maximum" = 1000000000))]
     pub record_every: u64,
+    /// Whether those rows also hold the work of gravity and the heat of each channel of the contacts.
+    #[serde(default)]
+    pub ledger: bool,
     /// Instants in `grains.vtkhdf` and `contacts.vtkhdf` besides the start, for ParaView; 0 writes none.
     #[serde(default)]
     #[schemars(extend("minimum" = 0, "maximum" = 100000))]
