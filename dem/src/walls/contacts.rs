@@ -331,6 +331,7 @@ impl WallContacts {
 ///
 /// Histories go on where a contact's normal has turned least since the last step: from face to edge to face
 /// there is one contact, whatever triangles it is with.
+#[inline(never)]
 fn meet_mesh<I: Interaction>(
     rows: &mut [WallContact],
     near: &[Near],
@@ -412,6 +413,7 @@ fn start_travel(wall: &mut Standing, grains: &Grains, domain: &Domain, skin: f64
 
 impl WallContact {
     /// Evaluates the law on one contact; its overlap over the radius.
+    #[inline(always)]
     fn evaluate<I: Interaction>(
         &mut self,
         law: &I,
@@ -435,7 +437,7 @@ impl WallContact {
             }
             return 0.0;
         }
-        let normal = Vec3([foot.normal.x, foot.normal.y, foot.normal.z]);
+        let normal = Vec3(foot.normal.into());
         let begins = !self.touching || normal.dot(Vec3(self.normal)) < 0.0;
         if begins {
             self.history = [0.0; HISTORY_MAX];

@@ -82,8 +82,9 @@ impl Standing {
         standing
     }
 
+    #[inline(always)]
     pub fn moves(&self) -> bool {
-        self.wall.motion != Motion::Fixed
+        !matches!(self.wall.motion, Motion::Fixed)
     }
 
     /// A step under the present load.
