@@ -2,6 +2,7 @@
 
 use crate::setup::{SetupError, check};
 use nalgebra::Vector3;
+use std::fmt;
 
 /// A part of space (m).
 #[derive(Clone, Debug, PartialEq)]
@@ -71,6 +72,90 @@ impl Region {
         }
     }
 
+    /// How deep a point lies inside (m): a ball of this radius about it fits in. Negative outside, where
+    /// it is no farther from the region than that says.
+    ///
+    /// Exact for one shape; a lower bound where shapes are combined.
+    pub fn depth(&self, x: &Vector3<f64>) -> f64 {
+        match self {
+            Region::Everywhere => f64::INFINITY,
+            Region::Block { lower, upper } => (0..3)
+                .map(|k| (x[k] - lower[k]).min(upper[k] - x[k]))
+                .fold(f64::INFINITY, f64::min),
+            Region::Ball { center, radius } => radius - (x - center).norm(),
+            Region::Slab {
+                point,
+                normal,
+                thickness,
+            } => 0.5 * thickness - (x - point).dot(normal).abs() / normal.norm(),
+            Region::Cylinder {
+                point,
+                axis,
+                radius,
+            } => radius - (x - point).cross(axis).norm() / axis.norm(),
+            Region::All(parts) => {
+                let depths = parts.iter().map(|part| part.depth(x));
+                depths.fold(f64::INFINITY, f64::min)
+            }
+            Region::Any(parts) => {
+                let depths = parts.iter().map(|part| part.depth(x));
+                depths.fold(f64::NEG_INFINITY, f64::max)
+            }
+            Region::Outside(part) => -part.depth(x),
+        }
+    }
+
+    /// A block that holds it (m); infinite where it does not end, or may not.
+    pub fn bounds(&self) -> [Vector3<f64>; 2] {
+        let everything = [f64::NEG_INFINITY, f64::INFINITY].map(Vector3::repeat);
+        match self {
+            Region::Everywhere | Region::Outside(_) => everything,
+            Region::Block { lower, upper } => [*lower, *upper],
+            Region::Ball { center, radius } => {
+                let half = Vector3::repeat(*radius);
+                [center - half, center + half]
+            }
+            Region::Slab {
+                point,
+                normal,
+                thickness,
+            } => {
+                // Along an axis of its normal it ends; otherwise it does not.
+                let mut bounds = everything;
+                for k in (0..3).filter(|&k| normal[k].abs() == normal.norm()) {
+                    bounds[0][k] = point[k] - 0.5 * thickness;
+                    bounds[1][k] = point[k] + 0.5 * thickness;
+                }
+                bounds
+            }
+            Region::Cylinder {
+                point,
+                axis,
+                radius,
+            } => {
+                let mut bounds = everything;
+                if let Some(along) = (0..3).find(|&k| axis[k].abs() == axis.norm()) {
+                    for k in (0..3).filter(|&k| k != along) {
+                        bounds[0][k] = point[k] - radius;
+                        bounds[1][k] = point[k] + radius;
+                    }
+                }
+                bounds
+            }
+            Region::All(parts) => parts.iter().fold(everything, |[low, high], part| {
+                let [l, h] = part.bounds();
+                [low.sup(&l), high.inf(&h)]
+            }),
+            Region::Any(parts) => {
+                let nothing = [f64::INFINITY, f64::NEG_INFINITY].map(Vector3::repeat);
+                parts.iter().fold(nothing, |[low, high], part| {
+                    let [l, h] = part.bounds();
+                    [low.inf(&l), high.sup(&h)]
+                })
+            }
+        }
+    }
+
     /// Checks its numbers; `key` names it in errors.
     pub fn validate(&self, key: &str) -> Result<(), SetupError> {
         let finite = |name: &str, v: &Vector3<f64>| {
@@ -129,6 +214,58 @@ impl Region {
     }
 }
 
+impl fmt::Display for Region {
+    fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
+        let point = |v: &Vector3<f64>| format!("({:.4e}, {:.4e}, {:.4e}) m", v.x, v.y, v.z);
+        let list = |f: &mut fmt::Formatter, parts: &[Region], word: &str| {
+            parts.iter().enumerate().try_for_each(|(k, part)| {
+                let word = if k == 0 { "" } else { word };
+                write!(f, "{word}{part}")
+            })
+        };
+        match self {
+            Region::Everywhere => write!(f, "the whole box"),
+            Region::Block { lower, upper } => {
+                write!(f, "the block from {} to {}", point(lower), point(upper))
+            }
+            Region::Ball { center, radius } => {
+                write!(
+                    f,
+                    "the ball of radius {radius:.4e} m about {}",
+                    point(center)
+                )
+            }
+            Region::Slab {
+                point: at,
+                normal,
+                thickness,
+            } => write!(
+                f,
+                "the slab of thickness {thickness:.4e} m about {} across ({:.3}, {:.3}, {:.3})",
+                point(at),
+                normal.x,
+                normal.y,
+                normal.z
+            ),
+            Region::Cylinder {
+                point: at,
+                axis,
+                radius,
+            } => write!(
+                f,
+                "the cylinder of radius {radius:.4e} m through {} along ({:.3}, {:.3}, {:.3})",
+                point(at),
+                axis.x,
+                axis.y,
+                axis.z
+            ),
+            Region::All(parts) => list(f, parts, " in "),
+            Region::Any(parts) => list(f, parts, " or "),
+            Region::Outside(part) => write!(f, "outside {part}"),
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -163,6 +300,7 @@ mod tests {
             region.validate("region").unwrap();
             assert!(region.contains(&inside.into()), "{region:?}");
             assert!(!region.contains(&outside.into()), "{region:?}");
+            assert!(region.depth(&inside.into()) >= -1e-15 && region.depth(&outside.into()) < 0.0);
             let not = Region::Outside(Box::new(region.clone()));
             assert!(!not.contains(&inside.into()) && not.contains(&outside.into()));
         }
@@ -170,6 +308,61 @@ mod tests {
         let either = Region::Any(vec![top, pipe]);
         let below = Vector3::new(0.0, 0.0, 1.0);
         assert!(!both.contains(&below) && either.contains(&below));
+    }
+
+    #[test]
+    fn a_ball_as_large_as_the_depth_fits_in() {
+        let block = |low: f64, high: f64| Region::Block {
+            lower: Vector3::repeat(low),
+            upper: Vector3::repeat(high),
+        };
+        let ball = Region::Ball {
+            center: Vector3::new(1.0, 1.0, 2.0),
+            radius: 0.9,
+        };
+        let pipe = Region::Cylinder {
+            point: Vector3::repeat(1.0),
+            axis: Vector3::new(0.0, 2.0, 0.0),
+            radius: 0.7,
+        };
+        let all = Region::All(vec![
+            block(0.0, 2.0),
+            Region::Any(vec![ball, pipe]),
+            Region::Outside(Box::new(block(0.9, 1.1))),
+        ]);
+        let [low, high] = all.bounds();
+        // The ball ends along x, the pipe along z; along y only the block does.
+        assert!((low - Vector3::new(0.1, 0.0, 0.3)).norm() < 1e-12, "{low}");
+        assert!(
+            (high - Vector3::new(1.9, 2.0, 2.0)).norm() < 1e-12,
+            "{high}"
+        );
+        let (mut inside, mut outside) = (0, 0);
+        let n = 30;
+        for k in 0..n * n * n {
+            let cell = Vector3::new(k % n, k / n % n, k / (n * n)).map(|c| c as f64 + 0.43);
+            let x = cell * (2.2 / n as f64) - Vector3::repeat(0.1);
+            let depth = all.depth(&x);
+            assert_eq!(depth >= 0.0, all.contains(&x));
+            // Points of the sphere of that radius are on the same side.
+            for axis in 0..14 {
+                let ways = Vector3::new(axis % 3, axis / 3 % 3, axis / 9);
+                let way = ways.map(|c| f64::from(c) - 1.0);
+                if way.norm() == 0.0 {
+                    continue;
+                }
+                for turned in [way, -way] {
+                    let y = x + turned.normalize() * (0.999 * depth.abs());
+                    assert_eq!(all.contains(&y), depth >= 0.0, "{x:?} {depth}");
+                }
+            }
+            *if depth >= 0.0 {
+                &mut inside
+            } else {
+                &mut outside
+            } += 1;
+        }
+        assert!(inside > 1000 && outside > 1000);
     }
 
     #[test]
