@@ -37,7 +37,12 @@ impl Grain {
 
     /// Mass of the sphere (kg).
     pub fn mass(&self) -> f64 {
-        4.0 / 3.0 * std::f64::consts::PI * self.radius.powi(3) * self.density
+        self.volume() * self.density
+    }
+
+    /// Volume of the sphere (m³).
+    pub fn volume(&self) -> f64 {
+        4.0 / 3.0 * std::f64::consts::PI * self.radius.powi(3)
     }
 }
 

@@ -6,6 +6,7 @@ use crate::contact::{
 };
 use crate::domain::Domain;
 use crate::grains::Grain;
+use crate::preparation::{Rest, RestMeasures};
 use crate::timestep::{self, Choice, Conditions, Pair, Shares};
 use crate::walls::Wall;
 use nalgebra::Vector3;
@@ -98,6 +99,50 @@ pub enum SetupError {
     /// A preparation was stopped by its observer.
     #[error("preparation was interrupted")]
     Interrupted,
+    /// Random places are used up before all grains are in.
+    #[error(
+        "insertion: no room for grain {grain} of {grains} (radius {radius:.3e} m) in {tries} tries: a solid \
+         fraction of {reached:.3} is reached of {asked:.3} asked for; random places end near 0.38 for equal \
+         grains: insert less, or into a larger region and compact it"
+    )]
+    Full {
+        /// Which grain, in falling order of size.
+        grain: usize,
+        /// How many there were to be.
+        grains: usize,
+        /// Its radius (m).
+        radius: f64,
+        /// Places tried for it.
+        tries: u32,
+        /// Solid fraction reached.
+        reached: f64,
+        /// That of all grains.
+        asked: f64,
+    },
+    /// Grains did not come to rest in time.
+    #[error(
+        "preparation: not at rest after {patience} √(d/a): {measures}; asked for kinetic ≤ {:.1e}, \
+         unbalanced ≤ {:.1e}: more damping, more patience or a shorter step may help",
+        asked.kinetic, asked.unbalanced
+    )]
+    Restless {
+        /// What was reached.
+        measures: Box<RestMeasures>,
+        /// What was asked for.
+        asked: Rest,
+        /// Time it was given, in √(d/a).
+        patience: f64,
+    },
+    /// A packing does not get as dense, or as loose, as asked for.
+    #[error("preparation: solid fraction {reached:.4} reached of {asked:.4} asked for: {why}")]
+    Density {
+        /// What was reached.
+        reached: f64,
+        /// What was asked for.
+        asked: f64,
+        /// Why it ends there.
+        why: &'static str,
+    },
     /// The grains flew apart while they were prepared.
     #[error("preparation: {0}")]
     Diverged(#[from] crate::Diverged),

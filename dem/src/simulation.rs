@@ -528,18 +528,22 @@ impl Simulation {
         }
     }
 
-    /// A step that would do for these grains: that of contacts under a large overlap, and in a `leap`
-    /// that of the speeds, unless the contacts themselves have blown up.
-    fn remedy(&self, leap: bool) -> Remedy {
-        let n = self.grains.len();
-        let bodies = (0..n).map(|i| Body {
+    /// What limits the step: classes of grains alike, and the walls.
+    pub(crate) fn classes(&self) -> Classes {
+        let bodies = (0..self.grains.len()).map(|i| Body {
             material: self.grains.material[i],
             radius: self.grains.place[i][3],
             mass: self.grains.mass[i],
             fixed: self.grains.is_fixed(i),
         });
         let walls: Vec<u16> = self.walls.iter().map(|w| w.wall.material).collect();
-        let classes = Classes::of(bodies, &walls);
+        Classes::of(bodies, &walls)
+    }
+
+    /// A step that would do for these grains: that of contacts under a large overlap, and in a `leap`
+    /// that of the speeds, unless the contacts themselves have blown up.
+    fn remedy(&self, leap: bool) -> Remedy {
+        let classes = self.classes();
         let choice = |speed: f64| {
             let conditions = Conditions {
                 speed,
@@ -554,6 +558,7 @@ impl Simulation {
         let mut choice_now = choice(0.0);
         if leap && self.timestep <= choice_now.seconds {
             // Two grains may meet head on.
+            let n = self.grains.len();
             let speeds = self.grains.motion[..n].iter().map(|v| vector(v).norm());
             choice_now = choice(2.0 * speeds.fold(0.0, f64::max));
         }
@@ -573,6 +578,17 @@ impl Simulation {
     pub(crate) fn size_lists(&mut self, smallest: f64, largest: f64) {
         self.set_skin(skin_of(smallest));
         self.hold = hold_of(&self.law, largest);
+    }
+
+    /// Takes other laws of the same parts.
+    pub(crate) fn set_laws(&mut self, laws: LawTable) {
+        let n = self.grains.len();
+        let largest = self.grains.place[..n]
+            .iter()
+            .map(|x| x[3])
+            .fold(0.0, f64::max);
+        self.hold = hold_of(&laws, largest);
+        self.law = Arc::new(laws);
     }
 
     pub(crate) fn set_skin(&mut self, skin: f64) {
@@ -707,7 +723,7 @@ impl Simulation {
     }
 
     /// Starts the momentum account with what there is now.
-    fn open_account(&mut self) {
+    pub(crate) fn open_account(&mut self) {
         self.weigh();
         self.account = self.leapfrog_momentum() + self.wall_impulse();
         if self.ledger.is_some() {
