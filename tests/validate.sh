@@ -1,6 +1,7 @@
 #!/bin/sh
 # The long forms of the tests across crates: bulk laws with several seeds and sizes, optimised.
-# Prints what they measure; some 25 minutes of one core. A name as argument runs only tests that hold it.
+# Prints what they measure; 15 minutes on a quiet core, 25 on a busy one. A name as argument runs only the
+# tests that hold it.
 set -eu
 cd "$(dirname "$0")/.."
 .ci/system-packages

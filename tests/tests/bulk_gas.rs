@@ -3,7 +3,7 @@
 #![allow(clippy::unwrap_used)]
 
 use colluvium_dem::Snapshot;
-use colluvium_tests::fit::{Line, largest};
+use colluvium_tests::fit::{Line, largest, mean_and_error};
 use colluvium_tests::gas::{Gas, pressure, temperature};
 
 /// Stiff enough that a contact lasts 0.6 % of the free time at φ = 0.1 and 6 % at φ = 0.4.
@@ -75,11 +75,30 @@ fn a_gas_cools_as_haff_says() {
     check_cooling(&gas(7, 0.1, 0.9, 4), 3.0, [0.2, 0.1]);
 }
 
+/// Single gases of 1 728 grains scatter by 0.07 in the exponent and by 0.014 in t_c: means of six. Over
+/// 4 t_c instead of 2 the exponent falls to 1.96 ± 0.01 at e = 0.9: these boxes are near the size at which
+/// shear grows in the gas and its heat lasts longer, and Haff's law is that of the gas without.
 #[test]
-#[ignore = "long: 3 min, 1 728 grains, four gases"]
+#[ignore = "long: 4 min, 1 728 grains, four gases, six seeds"]
 fn gases_cool_as_haff_says() {
     for (phi, e) in [(0.05, 0.9), (0.1, 0.9), (0.1, 0.8), (0.2, 0.95)] {
-        check_cooling(&gas(12, phi, e, 3), 4.0, [0.08, 0.025]);
+        let runs: Vec<_> = (1..=6)
+            .map(|seed| cool(&gas(12, phi, e, seed), 2.0))
+            .collect();
+        let over = |value: fn(&Cooling) -> f64| {
+            let values: Vec<f64> = runs.iter().map(value).collect();
+            mean_and_error(&values)
+        };
+        let (exponent, of_exponent) = over(|c| c.exponent);
+        let (time, of_time) = over(|c| c.time);
+        println!(
+            "φ {phi} e {e}: exponent {exponent:.3} ± {of_exponent:.3}, t_c/theory {time:.4} ± {of_time:.4}"
+        );
+        assert!(runs.iter().all(|c| c.r2 > 0.999));
+        assert!(of_exponent < 0.05 && of_time < 0.01);
+        assert!((exponent - 2.0).abs() < 0.02 + 2.0 * of_exponent);
+        // Soft grains collide later, by ω τ (1.5 % at φ = 0.2); at e = 0.8 velocities correlate.
+        assert!((time - 1.0).abs() < 0.025 + 2.0 * of_time);
     }
 }
 

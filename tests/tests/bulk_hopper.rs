@@ -2,7 +2,8 @@
 //! stands above; n = 5/2 for a round hole and 3/2, by length, for a slot.
 //!
 //! The bottom is a layer of fixed grains; D is measured between the surfaces of the rim's grains, so
-//! that the rim is rounded.
+//! that the rim is rounded. Such rims have a k of their own, smaller than the 1.4 ± 0.1 of sharp ones
+//! (Nedderman 1992): slot and hole must agree on it, and k from the one gives the other's exponent.
 
 #![allow(clippy::unwrap_used)]
 
@@ -29,33 +30,47 @@ struct Beverloo {
     k: f64,
     /// Share of the variance of W^{1/n} that the law explains.
     r2: f64,
-    /// The exponent, where k is taken for granted.
-    exponent: f64,
     /// The exponent of bare D.
     bare: f64,
+    /// D and W.
+    rates: Vec<(f64, f64)>,
 }
 
-fn fit(rates: &[(f64, f64)], n: f64) -> Beverloo {
-    let of = |f: &dyn Fn(f64) -> f64, g: &dyn Fn(f64) -> f64| {
-        let points: Vec<_> = rates.iter().map(|&(d, w)| (f(d), g(w))).collect();
-        Line::through(&points)
-    };
-    let straight = of(&|d| d, &|w| w.powf(1.0 / n));
-    let fit = Beverloo {
+impl Beverloo {
+    /// The exponent, where k is taken for granted.
+    fn exponent(&self, k: f64) -> f64 {
+        let points: Vec<_> = self
+            .rates
+            .iter()
+            .map(|&(d, w)| ((d - k).ln(), w.ln()))
+            .collect();
+        Line::through(&points).slope
+    }
+}
+
+fn fit(rates: Vec<(f64, f64)>, n: f64) -> Beverloo {
+    let points: Vec<_> = rates.iter().map(|&(d, w)| (d, w.powf(1.0 / n))).collect();
+    let straight = Line::through(&points);
+    let mut fit = Beverloo {
         k: -straight.intercept / straight.slope,
         r2: straight.r2,
-        exponent: of(&|d| (d - K).ln(), &f64::ln).slope,
-        bare: of(&f64::ln, &f64::ln).slope,
+        bare: 0.0,
+        rates,
     };
+    fit.bare = fit.exponent(0.0);
     println!(
         "n = {n}: k {:.2}, R² {:.4}; exponent at k = {K} {:.2}, of bare D {:.2}",
-        fit.k, fit.r2, fit.exponent, fit.bare
+        fit.k,
+        fit.r2,
+        fit.exponent(K),
+        fit.bare
     );
     fit
 }
 
-/// k of the literature's beads (Nedderman 1992: 1.4 ± 0.1; rounded rims lower it).
-const K: f64 = 1.4;
+/// k of these rims: 0.98 and 1.09 of the slot, 0.80 and 0.87 of the hole in two runs of the long form
+/// that differ by round-off.
+const K: f64 = 0.9;
 
 fn slot(size: f64, seed: u64) -> Hopper {
     Hopper {
@@ -100,27 +115,29 @@ fn discharge(
             (size, 0.5 * (first + second))
         })
         .collect();
-    fit(&rates, n)
+    fit(rates, n)
 }
 
-fn check(fit: &Beverloo, n: f64, r2: f64, [low, high]: [f64; 2], exponent: f64) {
+/// Checks a fit with the k that it finds, and its exponent at another k.
+fn check(fit: &Beverloo, n: f64, other_k: f64, r2: f64, exponent: f64) {
     assert!(fit.r2 > r2, "{}", fit.r2);
-    assert!((low..high).contains(&fit.k), "{}", fit.k);
-    assert!((fit.exponent - n).abs() < exponent, "{}", fit.exponent);
+    assert!((0.5..1.5).contains(&fit.k), "{}", fit.k);
+    let found = fit.exponent(other_k);
+    assert!((found - n).abs() < exponent, "{found}");
     // The control: without the empty annulus of k d the exponent is another one.
-    assert!(fit.bare > n + 0.2, "{}", fit.bare);
+    assert!(fit.bare > n + 0.25, "{}", fit.bare);
 }
 
 #[test]
 fn a_slot_discharges_as_beverloo_says() {
     let fit = discharge(slot, 1.5, &[3.5, 4.5, 6.0], &[2], 500, 0.2);
-    check(&fit, 1.5, 0.98, [0.5, 2.0], 0.4);
+    check(&fit, 1.5, K, 0.98, 0.25);
 }
 
 #[test]
 fn a_hole_discharges_as_beverloo_says() {
     let fit = discharge(hole, 2.5, &[4.0, 5.0, 6.5], &[2], 200, 0.25);
-    check(&fit, 2.5, 0.98, [0.3, 2.0], 0.6);
+    check(&fit, 2.5, K, 0.98, 0.4);
 }
 
 #[test]
@@ -128,8 +145,9 @@ fn a_hole_discharges_as_beverloo_says() {
 fn openings_discharge_as_beverloo_says() {
     let seeds = [3, 4, 5];
     let sizes = [3.5, 4.0, 4.5, 5.0, 6.0];
-    let fit = discharge(slot, 1.5, &sizes, &seeds, 700, 0.08);
-    check(&fit, 1.5, 0.99, [0.5, 1.8], 0.25);
-    let fit = discharge(hole, 2.5, &[4.0, 5.0, 6.0, 7.0], &seeds, 400, 0.1);
-    check(&fit, 2.5, 0.99, [0.8, 1.8], 0.3);
+    let slot = discharge(slot, 1.5, &sizes, &seeds, 700, 0.08);
+    let hole = discharge(hole, 2.5, &[4.0, 5.0, 6.0, 7.0], &seeds, 400, 0.1);
+    check(&slot, 1.5, hole.k, 0.99, 0.15);
+    check(&hole, 2.5, slot.k, 0.99, 0.25);
+    assert!((slot.k - hole.k).abs() < 0.4);
 }

@@ -3,6 +3,8 @@
 //! Needs Python with VTK (PyPI `vtk`): that of `COLLUVIUM_VTK_PYTHON`, of the system, or one that the test
 //! installs beside the build. Where none can be had, only our own reader looks at the files.
 
+#![allow(clippy::unwrap_used)]
+
 use colluvium::frames;
 use colluvium::vtkhdf;
 use colluvium_dem::{

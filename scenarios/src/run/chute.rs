@@ -223,7 +223,7 @@ fn is_bundled(scene: &Scene) -> bool {
     let Ok(mut bundled) = Scene::load("chute", &[]).map(|scene| scene.resolved) else {
         return false;
     };
-    for key in ["steps", "duration", "record_every", "ledger"] {
+    for key in ["steps", "duration", "record_every", "ledger", "frames"] {
         own.remove(key);
         bundled.remove(key);
     }
