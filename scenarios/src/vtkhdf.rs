@@ -121,7 +121,7 @@ pub fn write(
     put_in_place(&partial, path).map_err(|error| failed(error.to_string()))
 }
 
-/// Reads a file of one frame that [`write`] has written.
+/// Reads a file of one frame that [`write()`] has written.
 pub fn read_frame(path: &Path) -> Result<Frame, Failure> {
     read(path)
         .map_err(|error| Failure::Run(format!("cannot read the frame {}: {error}", path.display())))
