@@ -1,5 +1,6 @@
 //! The simulation: one state, one step.
 
+use crate::bodies::Bodies;
 use crate::bonds::Bonds;
 use crate::boundaries::{Drain, MovingBox};
 use crate::contact::composition::Visitor;
@@ -44,9 +45,24 @@ pub enum Diverged {
         /// A step that would do.
         remedy: Remedy,
     },
-    /// Grains have run through each other.
+    /// A body's position is no longer a number.
     #[error(
-        "grains overlapped by {overlap:.2} of their radius before t = {time:e} s: the time step of \
+        "body {body} has left the range of numbers at t = {time:e} s: the time step of \
+         {timestep:e} s is too long for the stiffness and speeds of this scene; {remedy}"
+    )]
+    Lost {
+        /// Number of the body.
+        body: usize,
+        /// When it was found (s).
+        time: f64,
+        /// The step (s).
+        timestep: f64,
+        /// A step that would do.
+        remedy: Remedy,
+    },
+    /// Grains or bodies have run through each other.
+    #[error(
+        "grains or bodies overlapped by {overlap:.2} of their radius before t = {time:e} s: the time step of \
          {timestep:e} s is too long, or the grains are too soft for their speeds; {remedy}"
     )]
     Overlap {
@@ -156,6 +172,8 @@ pub struct Simulation {
     pub(crate) list: Neighbours,
     pub(crate) reach: Reach,
     pub(crate) wall_contacts: WallContacts,
+    /// Bodies; their parts stand behind the walls.
+    pub(crate) bodies: Bodies,
     pub(crate) loads: Loads,
     pub(crate) bonds: Bonds,
     pub(crate) fields: Gravity,
@@ -238,13 +256,16 @@ impl Simulation {
         let largest_radius = radii().fold(0.0, f64::max);
         let skin = skin_of(smallest);
         let law = setup.validate(skin)?;
+        let mut walls = stand(setup.walls, setup.timestep);
+        let bodies = Bodies::new(setup.bodies, &mut walls, &law, setup.timestep)?;
         Ok(Simulation {
             domain: setup.domain,
             gravity: setup.gravity,
             layout: law.visit(LayoutOf),
             hold: hold_of(&law, largest_radius),
             law: Arc::new(law),
-            walls: stand(setup.walls, setup.timestep),
+            walls,
+            bodies,
             timestep: setup.timestep,
             parallel: setup.threads == Threads::Rayon,
             width: Width::widest(),
@@ -333,6 +354,7 @@ impl Simulation {
         self.reach.remember();
         self.bonds.remember();
         self.wall_contacts.remember();
+        self.bodies.remember();
         self.springs_were_current = self.springs_current;
         self.evaluate_forces();
     }
@@ -345,6 +367,7 @@ impl Simulation {
         self.reach.recall();
         self.bonds.recall();
         self.wall_contacts.recall();
+        self.bodies.recall();
         self.springs_current = self.springs_were_current;
         self.current = false;
     }
@@ -378,7 +401,7 @@ impl Simulation {
         };
         self.springs_current = true;
         let lever = self.law.lever();
-        let walls = if pass == Pass::Motion {
+        let mut walls = if pass == Pass::Motion {
             0.0
         } else {
             let scene = Scene {
@@ -390,6 +413,11 @@ impl Simulation {
             self.wall_contacts.evaluate(law, &mut self.walls, &scene)
         };
         if pass != Pass::Motion {
+            if !self.bodies.is_empty() {
+                self.lay_body_loads();
+                let bodies = &mut self.bodies;
+                walls = walls.max(bodies.evaluate(law, &mut self.walls, &self.domain, step));
+            }
             self.evaluate_loads(step.stretch);
         }
         let (g, images) = (self.gravity, Images::of(&self.cell()));
@@ -432,12 +460,16 @@ impl Simulation {
     /// Books what a step has done to momentum and to the lists' lifetimes, and moves the walls.
     fn keep_accounts(&mut self, kick: f64) {
         let next = Span::ending(self.steps + 1, self.timestep);
-        for wall in &mut self.walls {
+        let walls = self.walls.iter_mut();
+        for wall in walls.filter(|wall| wall.carrier.is_none()) {
             for (sum, force) in self.impulse.iter_mut().zip(wall.load.force.iter()) {
                 *sum += kick * force;
             }
             wall.impulse.take(&wall.load, kick);
             wall.advance(next);
+        }
+        if !self.bodies.is_empty() {
+            self.step_bodies(kick);
         }
         self.account += kick * (self.weighed * self.gravity + self.loads.external);
         self.list.age += self.timestep;
@@ -515,6 +547,16 @@ impl Simulation {
                 remedy: self.remedy(false),
             });
         }
+        let mut bodies = self.bodies.rigid.iter();
+        let lost = |x: &f64| !(x.abs() < 1e150);
+        if let Some(body) = bodies.position(|body| body.state().iter().any(lost)) {
+            return Err(Diverged::Lost {
+                body,
+                time,
+                timestep,
+                remedy: self.remedy(false),
+            });
+        }
         let n = self.grains.len();
         let lost = |x: &[f64; 4]| !x.iter().all(|c| c.abs() < 1e150);
         match self.grains.place[..n].iter().position(lost) {
@@ -536,8 +578,9 @@ impl Simulation {
             mass: self.grains.mass[i],
             fixed: self.grains.is_fixed(i),
         });
-        let walls: Vec<u16> = self.walls.iter().map(|w| w.wall.material).collect();
-        Classes::of(bodies, &walls)
+        let walls = self.walls.iter().filter(|w| w.carrier.is_none());
+        let walls: Vec<u16> = walls.map(|w| w.wall.material).collect();
+        Classes::of(bodies.chain(self.bodies.classes(&self.walls)), &walls)
     }
 
     /// A step that would do for these grains: that of contacts under a large overlap, and in a `leap`
@@ -717,7 +760,9 @@ impl Simulation {
 
     /// Velocities now belong to the time of the positions, not to half a step before.
     fn restart_motion(&mut self) {
+        self.synchronise_bodies();
         self.steps_since_start = 0;
+        self.bodies.place(&mut self.walls);
         self.rebuild();
         self.open_account();
     }
@@ -733,7 +778,8 @@ impl Simulation {
 
     /// Notes the mass that gravity acts on.
     pub(crate) fn weigh(&mut self) {
-        self.weighed = self.free_mass();
+        let bodies = self.bodies.rigid.iter().map(|body| body.free_mass());
+        self.weighed = self.free_mass() + bodies.sum::<f64>();
     }
 
     /// Time since the start (s).
