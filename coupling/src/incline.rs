@@ -92,6 +92,8 @@ impl InclineRun {
                 grains: Vec::new(),
                 contacts: Vec::new(),
                 bonds: Vec::new(),
+                bodies: Vec::new(),
+                body_contacts: Vec::new(),
             },
             averager: Averager::new(Layers, layers)?,
             simulation,

@@ -104,6 +104,8 @@ fn network_at_rest(seed: u64) -> Snapshot {
         grains,
         contacts,
         bonds,
+        bodies: Vec::new(),
+        body_contacts: Vec::new(),
     }
 }
 
@@ -192,6 +194,8 @@ fn stack() -> Snapshot {
         grains,
         contacts,
         bonds: Vec::new(),
+        bodies: Vec::new(),
+        body_contacts: Vec::new(),
     }
 }
 
@@ -271,6 +275,8 @@ fn sheared_gas(rng: &mut ChaCha8Rng, time: f64, shear: f64, temperature: f64) ->
         grains,
         contacts: vec![],
         bonds: Vec::new(),
+        bodies: Vec::new(),
+        body_contacts: Vec::new(),
     }
 }
 

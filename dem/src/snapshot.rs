@@ -1,5 +1,6 @@
 //! What an observer sees of the grains at one instant: the input of coarse-graining and of output.
 
+use crate::bodies::{BodyContactSample, BodySample};
 use crate::bonds::BondStress;
 use crate::domain::Domain;
 use nalgebra::Vector3;
@@ -30,6 +31,8 @@ pub enum Partner {
     Grain(usize),
     /// Index of the wall.
     Wall(usize),
+    /// Index of the body.
+    Body(usize),
 }
 
 /// A contact at one instant. Each pair appears once.
@@ -45,7 +48,8 @@ pub struct ContactSample {
     pub force: Vector3<f64>,
     /// From the centre of `grain` to the contact point (m).
     pub arm: Vector3<f64>,
-    /// From the centre of `partner` to the contact point (m); zero for a wall.
+    /// From the centre of `partner` to the contact point (m); zero for a wall or
+    /// a body.
     ///
     /// `arm - partner_arm` is the branch vector from `grain` to `partner`, nearest image.
     pub partner_arm: Vector3<f64>,
@@ -99,6 +103,10 @@ pub struct Snapshot {
     pub contacts: Vec<ContactSample>,
     /// All whole bonds, in the order in which they were made.
     pub bonds: Vec<BondSample>,
+    /// All rigid bodies.
+    pub bodies: Vec<BodySample>,
+    /// Contacts of bodies with walls and with each other.
+    pub body_contacts: Vec<BodyContactSample>,
 }
 
 impl Default for Snapshot {
@@ -114,6 +122,8 @@ impl Default for Snapshot {
             grains: Vec::new(),
             contacts: Vec::new(),
             bonds: Vec::new(),
+            bodies: Vec::new(),
+            body_contacts: Vec::new(),
         }
     }
 }

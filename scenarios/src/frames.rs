@@ -228,7 +228,7 @@ pub fn contacts(snapshot: &Snapshot) -> Frame {
         overlap: contact.overlap,
         kind: match contact.partner {
             Partner::Grain(_) => Kind::Pair,
-            Partner::Wall(_) => Kind::Wall,
+            Partner::Wall(_) | Partner::Body(_) => Kind::Wall,
         },
         stress: [0.0; 2],
     });

@@ -119,6 +119,7 @@ pub fn rests(bed: &Bed, law: ContactLaw, slope: f64) -> Result<bool, SetupError>
         law: law.into(),
         grains: bed.grains.clone(),
         walls: vec![],
+        bodies: Vec::new(),
         timestep: timestep::step(1.0, STIFFNESS, STEPS),
         threads: Threads::Serial,
     })?;

@@ -94,6 +94,7 @@ fn rain() -> Simulation {
         law: law.into(),
         grains,
         walls: vec![Wall::plane(Vector3::zeros(), Vector3::z())],
+        bodies: Vec::new(),
         timestep: 1e-4,
         threads: Threads::Serial,
     };

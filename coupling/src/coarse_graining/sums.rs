@@ -101,7 +101,7 @@ pub(super) fn add<K: Kernel>(kernel: &K, layers: &Layering, snapshot: &Snapshot,
         let grain = &snapshot.grains[contact.grain];
         let (other_free, other_z) = match contact.partner {
             Partner::Grain(j) => (!snapshot.grains[j].fixed, snapshot.grains[j].position.z),
-            Partner::Wall(_) => (false, 0.0),
+            Partner::Wall(_) | Partner::Body(_) => (false, 0.0),
         };
         if !grain.fixed {
             add_arm(

@@ -223,6 +223,7 @@ impl InclineSpec {
             law: self.law.into(),
             grains,
             walls: Vec::new(),
+            bodies: Vec::new(),
             timestep: self.timestep,
             threads: self.threads,
         }

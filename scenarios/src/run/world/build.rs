@@ -102,6 +102,7 @@ impl Stand {
             law: materials.laws.clone(),
             grains,
             walls: world.walls.iter().map(|(_, wall)| wall.clone()).collect(),
+            bodies: Vec::new(),
             timestep: 1.0,
             threads,
         };

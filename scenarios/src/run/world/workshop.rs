@@ -139,6 +139,7 @@ impl<'a> Workshop<'a> {
             law: around.laws.clone(),
             grains: self.packing.grains.clone(),
             walls: around.walls.clone(),
+            bodies: Vec::new(),
             timestep: 1.0,
             threads: self.threads,
         };
@@ -252,6 +253,7 @@ impl<'a> Workshop<'a> {
             law: around.laws.clone(),
             grains: self.packing.grains.clone(),
             walls: around.walls.clone(),
+            bodies: Vec::new(),
             timestep: 1.0,
             threads: self.threads,
         };

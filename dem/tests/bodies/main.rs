@@ -1,0 +1,8 @@
+//! Rigid bodies against closed forms and conservation laws.
+
+#![allow(clippy::unwrap_used)]
+
+mod grains;
+mod impacts;
+mod scene;
+mod tops;
