@@ -1,13 +1,12 @@
 //! Checkpoints: a state, to the bit, as HDF5.
 //!
 //! The one before the last is kept beside it. Each file ends in a seal over all bytes before it
-//! (`seal.rs`), so that a damaged one is found before anything is read from it.
-
-mod seal;
+//! ([`seal`]), so that a damaged one is found before anything is read from it.
 
 use crate::failure::Failure;
 use crate::results_file::{attribute, put_in_place, read_attribute, reason};
 use crate::run_directory::{CHECKPOINT, CHECKPOINT_BEFORE};
+use crate::seal;
 use colluvium_dem::Record;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
@@ -322,7 +321,7 @@ mod tests {
         let path = folder.path().join("other.h5");
         hdf5::File::create(&path).unwrap().flush().unwrap();
         let message = read(&path, SCENE).unwrap_err().to_string();
-        assert!(message.contains("not a checkpoint"), "{message}");
+        assert!(message.contains("not a file of this"), "{message}");
         // A sealed file of something else.
         seal::close(&path).unwrap();
         let message = read(&path, SCENE).unwrap_err().to_string();

@@ -1,4 +1,4 @@
-//! The last line of a checkpoint: a checksum of all bytes before it.
+//! The last line of checkpoints and packings: a checksum of all bytes before it.
 //!
 //! HDF5 passes over what stands behind its end of file, so that the file stays one that every HDF5
 //! program opens; but its library is not asked to make sense of damaged bytes.
@@ -32,7 +32,7 @@ fn checksum(file: &mut impl Read, length: u64) -> io::Result<u32> {
 }
 
 /// Adds the line to a finished file.
-pub(super) fn close(path: &Path) -> io::Result<()> {
+pub fn close(path: &Path) -> io::Result<()> {
     let mut file = OpenOptions::new().read(true).append(true).open(path)?;
     let length = file.metadata()?.len();
     let sum = checksum(&mut file, length)?;
@@ -40,7 +40,7 @@ pub(super) fn close(path: &Path) -> io::Result<()> {
 }
 
 /// Says what is wrong with a file that does not end in the line of its bytes.
-pub(super) fn check(path: &Path) -> Result<(), String> {
+pub fn check(path: &Path) -> Result<(), String> {
     let unreadable = |error: io::Error| format!("it cannot be read ({error})");
     let mut file = File::open(path).map_err(unreadable)?;
     let length = file.metadata().map_err(unreadable)?.len();
@@ -52,7 +52,7 @@ pub(super) fn check(path: &Path) -> Result<(), String> {
     let found = file.read_to_string(&mut end);
     if found.is_err() || !end.starts_with(MARK) {
         return Err(
-            "damaged or not a checkpoint of this program: it was cut off, or does not end in its checksum"
+            "damaged or not a file of this program: it was cut off, or does not end in its checksum"
                 .into(),
         );
     }
