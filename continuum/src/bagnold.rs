@@ -26,7 +26,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, require};
 use crate::grid::Boundary;
-use crate::layer::{Layer, LayerSolution, Options, Progress};
+use crate::layer::{Layer, LayerRun, LayerSolution, Options, Progress};
 use crate::rheology::MuI;
 use crate::units::Units;
 
@@ -151,6 +151,16 @@ impl BagnoldCase {
         options: &Options,
         progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<BagnoldSolution, Error> {
+        let mut run = self.begin(options)?;
+        run.march(progress)?;
+        Ok(self.solution(&run))
+    }
+
+    /// The layer at rest, ready to be advanced.
+    ///
+    /// # Errors
+    /// Parameters out of range.
+    pub fn begin(&self, options: &Options) -> Result<LayerRun, Error> {
         self.validate()?;
         let layer = Layer {
             units: self.units(),
@@ -164,11 +174,11 @@ impl BagnoldCase {
             ],
             rheology: self.rheology,
         };
-        layer.solve(
-            options,
-            |z| self.exact_velocity(z),
-            |z| self.exact_pressure(z),
-            progress,
-        )
+        layer.begin(options, &|z| self.exact_pressure(z))
+    }
+
+    /// A run's flow as it is, beside the exact solution.
+    pub fn solution(&self, run: &LayerRun) -> BagnoldSolution {
+        run.solution(|z| self.exact_velocity(z), |z| self.exact_pressure(z))
     }
 }

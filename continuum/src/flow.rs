@@ -96,6 +96,31 @@ impl Marching {
     }
 }
 
+/// A march under way: with the flow's state it is all that a march needs to go on with the same bits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct March {
+    /// Every step made.
+    pub history: Vec<StepRecord>,
+    /// Time step that growth alone would ask for now.
+    pub scheduled: f64,
+    /// Time step to be tried next.
+    pub next: f64,
+    /// Whether the flow is steady, or its end time reached.
+    pub over: bool,
+}
+
+impl March {
+    /// The beginning of a march.
+    pub fn new(marching: &Marching) -> March {
+        March {
+            history: Vec::new(),
+            scheduled: marching.time_step,
+            next: marching.time_step,
+            over: false,
+        }
+    }
+}
+
 /// What one time step did; all values in natural units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StepRecord {
@@ -230,35 +255,65 @@ impl<R: Rheology> Flow<R> {
         progress: &mut dyn FnMut(&StepRecord) -> ControlFlow<()>,
     ) -> Result<Vec<StepRecord>, Error> {
         marching.validate()?;
-        let mut history: Vec<StepRecord> = Vec::new();
-        let mut scheduled = marching.time_step;
-        let mut dt = scheduled;
-        while history.len() < marching.max_steps {
-            if let Some(end) = marching.end_time {
-                dt = dt.min(end - self.time);
-            }
-            let record = self.step(dt)?;
-            history.push(record);
-            if progress(&record).is_break() {
+        let mut march = March::new(marching);
+        while !march.over {
+            self.march_step(marching, &mut march)?;
+            let broken_off = march.history.last().map(&mut *progress);
+            if broken_off.is_some_and(|flow| flow.is_break()) {
                 return Err(Error::Stopped {
-                    steps: history.len(),
+                    steps: march.history.len(),
                 });
             }
-            let is_over = marching
-                .end_time
-                .is_some_and(|end| self.time >= end * (1.0 - 1e-12));
-            if is_over || self.is_steady(&record, marching) {
-                return Ok(history);
-            }
-            scheduled *= marching.growth;
-            dt = scheduled.min(2.0_f64.max(marching.growth) * record.dt);
         }
-        Err(Error::NotSteady {
-            steps: history.len(),
-            time: self.time,
-            acceleration: history.last().map_or(f64::NAN, |r| r.acceleration),
-            tolerance: marching.steady_acceleration,
-        })
+        Ok(march.history)
+    }
+
+    /// Makes the next step of a march.
+    ///
+    /// # Errors
+    /// [`Error::NotConverged`]; [`Error::NotSteady`] if all steps that the settings allow were made.
+    pub fn march_step(&mut self, marching: &Marching, march: &mut March) -> Result<(), Error> {
+        let steps = march.history.len();
+        if steps >= marching.max_steps {
+            return Err(Error::NotSteady {
+                steps,
+                time: self.time,
+                acceleration: march.history.last().map_or(f64::NAN, |r| r.acceleration),
+                tolerance: marching.steady_acceleration,
+            });
+        }
+        let end = marching.end_time;
+        let record = self.step(end.map_or(march.next, |end| march.next.min(end - self.time)))?;
+        march.history.push(record);
+        march.scheduled *= marching.growth;
+        march.next = march
+            .scheduled
+            .min(2.0_f64.max(marching.growth) * record.dt);
+        let is_over = end.is_some_and(|end| self.time >= end * (1.0 - 1e-12));
+        march.over = is_over || self.is_steady(&record, marching);
+        Ok(())
+    }
+
+    /// Takes up a state that [`state`](Self::state) and [`time`](Self::time) gave of such a flow.
+    ///
+    /// # Errors
+    /// In words, if it is that of another grid.
+    pub fn take_up(&mut self, state: FlowState, time: f64) -> Result<(), String> {
+        let own = &self.state;
+        for (name, found, wanted) in [
+            ("velocities", state.u.len(), own.u.len()),
+            ("pressures", state.p.len(), own.p.len()),
+            ("stresses", state.s.len(), own.s.len()),
+        ] {
+            if found != wanted {
+                return Err(format!(
+                    "{found} {name} instead of the {wanted} of this grid"
+                ));
+            }
+        }
+        self.state = state;
+        self.time = time;
+        Ok(())
     }
 
     fn is_steady(&self, record: &StepRecord, marching: &Marching) -> bool {

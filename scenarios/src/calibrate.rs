@@ -51,7 +51,7 @@ pub fn calibrate(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> 
     let threads = options.threads.unwrap_or_else(rayon::current_num_threads);
     let (directory, before) = run::open_directory(scene, options, "calibrate")?;
     if before.is_some_and(|s| s.status == Status::Done) {
-        return Ok(run::already_done(&directory));
+        return run::already_done(&directory);
     }
     let before = finished_angles(&directory, options.resume)?;
     if options.resume {
@@ -74,9 +74,8 @@ pub fn calibrate(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> 
         Err(failure) => {
             // All input was checked before the directory was made: whatever fails now is the run,
             // and the angles that are finished stay.
-            let failure = failure.after_work();
-            directory.mark_ended(&failure, wall_before + start.elapsed().as_secs_f64())?;
-            Err(failure)
+            let wall_s = wall_before + start.elapsed().as_secs_f64();
+            Err(directory.mark_ended(failure.after_work(), wall_s))
         }
     }
 }

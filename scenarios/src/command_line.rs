@@ -9,6 +9,7 @@ use crate::run::{self, Ended, RunOptions};
 use crate::scene::{self, Scene};
 use clap::{Args, Parser, Subcommand};
 use std::path::PathBuf;
+use std::time::Duration;
 
 /// Granular flow by grains, by a continuum, and from one to the other.
 #[derive(Debug, Parser)]
@@ -45,6 +46,10 @@ enum Command {
         scene: SceneArguments,
         #[command(flatten)]
         how: RunArguments,
+        /// Wall time between two checkpoints, in seconds [default: 20, or what keeps their cost below
+        /// a twentieth]
+        #[arg(long, value_name = "SECONDS", value_parser = seconds)]
+        checkpoint_every: Option<Duration>,
     },
     /// Fit μ(I) to a campaign of inclined-plane runs and compare the continuum with it
     Calibrate {
@@ -108,6 +113,15 @@ impl SceneArguments {
     }
 }
 
+/// A wall time in seconds.
+fn seconds(text: &str) -> Result<Duration, String> {
+    let value: f64 = text.parse().map_err(|_| "not a number".to_owned())?;
+    Duration::try_from_secs_f64(value)
+        .ok()
+        .filter(|d| d.as_secs_f64() <= 1e6)
+        .ok_or_else(|| "allowed: [0, 1e6]".into())
+}
+
 #[derive(Debug, Args)]
 struct RunArguments {
     /// Directory of the results [default: the first free results/SCENE-N]
@@ -127,6 +141,7 @@ impl RunArguments {
             out: self.out.clone(),
             threads: self.threads.map(usize::from),
             resume: self.resume,
+            checkpoint_every: None,
         }
     }
 }
@@ -163,8 +178,16 @@ pub fn execute(line: CommandLine) -> Result<(), Failure> {
             run::check(&checked)?;
             print(plan::plan(&checked)?.trim_end());
         }
-        Command::Run { scene, how } => {
-            say(&run::run(&scene.load()?, &how.options())?)?;
+        Command::Run {
+            scene,
+            how,
+            checkpoint_every,
+        } => {
+            let options = RunOptions {
+                checkpoint_every,
+                ..how.options()
+            };
+            say(&run::run(&scene.load()?, &options)?)?;
         }
         Command::Calibrate { scene, how } => {
             say(&calibrate::calibrate(&scene.load()?, &how.options())?)?;

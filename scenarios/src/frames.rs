@@ -83,7 +83,8 @@ impl Frames {
         self.directory.join(FOLDER).join(name)
     }
 
-    /// Joins all frames up to the last step `done` into one file a series and removes the single ones.
+    /// Joins all frames up to the last step `done` into one file a series. The single ones stay until the run
+    /// is done: one that is killed in between joins them again.
     pub fn join(&self, done: u64) -> Result<(), Failure> {
         if self.count == 0 {
             return Ok(());
@@ -96,10 +97,7 @@ impl Frames {
             let series = self.directory.join(format!("{series}.vtkhdf"));
             vtkhdf::write(&series, paths.map(|path| vtkhdf::read_frame(&path)))?;
         }
-        remove(&self.directory).map_err(|error| {
-            let folder = self.directory.join(FOLDER);
-            Failure::Run(format!("cannot remove {}: {error}", folder.display()))
-        })
+        Ok(())
     }
 }
 

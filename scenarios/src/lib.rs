@@ -24,6 +24,7 @@ pub mod rheology_file;
 pub mod run;
 pub mod run_directory;
 pub mod scene;
+pub mod seal;
 pub mod start_file;
 pub mod state_hash;
 pub mod summary;

@@ -5,7 +5,7 @@
 //! Source: VTK file format documentation, "VTKHDF File Format" (Kitware).
 
 use crate::failure::Failure;
-use crate::results_file::{attribute, put_in_place, read_attribute};
+use crate::results_file::{attribute, put_in_place, read_attribute, reason};
 use hdf5::types::FixedAscii;
 use hdf5::{Dataset, Extent, Group, H5Type};
 use std::path::Path;
@@ -97,7 +97,7 @@ pub fn write(
         Failure::Run(format!("cannot write {}: {error}", path.display()))
     };
     let done = (|| -> Result<(), Failure> {
-        let run = |error: hdf5::Error| Failure::Run(error.to_string());
+        let run = |error: hdf5::Error| Failure::Run(reason(&error));
         let file = hdf5::File::create(&partial).map_err(run)?;
         let root = file.create_group("VTKHDF").map_err(run)?;
         let mut series: Option<Series> = None;
@@ -123,8 +123,10 @@ pub fn write(
 
 /// Reads a file of one frame that [`write()`] has written.
 pub fn read_frame(path: &Path) -> Result<Frame, Failure> {
-    read(path)
-        .map_err(|error| Failure::Run(format!("cannot read the frame {}: {error}", path.display())))
+    read(path).map_err(|error| {
+        let (path, reason) = (path.display(), reason(&error));
+        Failure::Run(format!("cannot read the frame {path}: {reason}"))
+    })
 }
 
 fn read(path: &Path) -> hdf5::Result<Frame> {

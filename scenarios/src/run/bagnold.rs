@@ -1,9 +1,8 @@
 //! A continuum layer on an incline: from the scene to the steady flow.
 
-use super::{Findings, Under};
+use super::{Findings, Under, march_record};
 use crate::cost::Cost;
 use crate::failure::Failure;
-use crate::interruption;
 use crate::progress::Bar;
 use crate::scene::{BagnoldScene, Scene, SolverMethod};
 use crate::state_hash;
@@ -92,10 +91,17 @@ pub(super) fn check(scene: &Scene, body: &BagnoldScene) -> Result<(), Failure> {
 }
 
 pub(super) fn run(scene: &BagnoldScene, under: &mut Under) -> Result<Findings, Failure> {
+    let case = case(scene);
+    let mut run = case.begin(&options(scene)).map_err(failure)?;
+    if let Some(saved) = &under.resumed {
+        march_record::take_up(&mut run, &saved.record).map_err(Failure::Input)?;
+    }
     under.begin()?;
     let bar = Bar::new("bagnold");
     let mut farthest = 1.0_f64;
-    let solved = solve(scene, &mut |progress: Progress| {
+    while !run.is_over() {
+        run.advance().map_err(failure)?;
+        let progress = run.progress();
         // Convergence is about geometric, so the logarithm of the distance runs evenly.
         farthest = farthest.max(progress.distance_to_steady);
         let left = progress.distance_to_steady.max(1.0).ln() / farthest.ln().max(1e-9);
@@ -104,17 +110,11 @@ pub(super) fn run(scene: &BagnoldScene, under: &mut Under) -> Result<Findings, F
             "step {}, {:.3} m/s",
             progress.step, progress.mean_velocity
         ));
-        if interruption::requested() {
-            ControlFlow::Break(())
-        } else {
-            ControlFlow::Continue(())
-        }
-    });
+        under.checkpoint("march", || march_record::save(&run))?;
+    }
     bar.clear();
-    let (solution, wall_s) = match solved {
-        Err(colluvium_continuum::Error::Stopped { .. }) => return Err(under.interrupted()),
-        other => other.map_err(failure)?,
-    };
+    let solution = case.solution(&run);
+    let wall_s = under.wall_s();
     under.directory.journal.note(&format!(
         "steady after {} steps, {} linear solves, {wall_s:.3} s",
         solution.steps, solution.linear_solves
