@@ -9,7 +9,7 @@ use crate::discretisation::ThresholdPressure;
 use crate::error::{Error, require};
 use crate::flow::{Flow, Marching, StepRecord, YieldMethod};
 use crate::grid::{Axis, Boundary, DIMENSIONS, Grid};
-use crate::rheology::{MuI, Rheology};
+use crate::rheology::Rheology;
 use crate::units::Units;
 
 /// Settings of a computation, in natural units of the case (time √(H/g) in a layer of depth H).
@@ -84,14 +84,14 @@ pub struct LayerSolution {
 }
 
 /// A layer to compute; lengths, accelerations and stresses in SI units.
-pub(crate) struct Layer {
+pub(crate) struct Layer<'a, L> {
     pub units: Units,
     pub cells: usize,
     pub columns: Option<usize>,
     pub low: Boundary,
     pub high: Boundary,
     pub acceleration: [f64; DIMENSIONS],
-    pub rheology: MuI,
+    pub rheology: &'a L,
 }
 
 /// Fewest cells across a layer: a pressure is extrapolated from two.
@@ -99,25 +99,25 @@ const MIN_CELLS: usize = 2;
 /// Most cells across a layer.
 const MAX_CELLS: usize = 1 << 20;
 
-impl Layer {
-    /// Refuses grids that make no sense.
-    pub(crate) fn validate_grid(cells: usize, columns: Option<usize>) -> Result<(), Error> {
+/// Refuses grids that make no sense.
+pub(crate) fn validate_grid(cells: usize, columns: Option<usize>) -> Result<(), Error> {
+    require(
+        (MIN_CELLS..=MAX_CELLS).contains(&cells),
+        "grid.cells",
+        cells as f64,
+        format!("{MIN_CELLS} to {MAX_CELLS}"),
+    )?;
+    columns.map_or(Ok(()), |columns| {
         require(
-            (MIN_CELLS..=MAX_CELLS).contains(&cells),
-            "grid.cells",
-            cells as f64,
-            format!("{MIN_CELLS} to {MAX_CELLS}"),
-        )?;
-        columns.map_or(Ok(()), |columns| {
-            require(
-                (3..=MAX_CELLS).contains(&columns),
-                "grid.columns",
-                columns as f64,
-                format!("3 to {MAX_CELLS}, or none for a flow that does not vary along x"),
-            )
-        })
-    }
+            (3..=MAX_CELLS).contains(&columns),
+            "grid.columns",
+            columns as f64,
+            format!("3 to {MAX_CELLS}, or none for a flow that does not vary along x"),
+        )
+    })
+}
 
+impl<L: Rheology> Layer<'_, L> {
     fn boundary_in_units(&self, boundary: Boundary) -> Boundary {
         match boundary {
             Boundary::NoSlip { velocity } => Boundary::NoSlip {
