@@ -5,14 +5,13 @@ use crate::cost::Cost;
 use crate::failure::Failure;
 use crate::interruption;
 use crate::progress::Bar;
-use crate::scene::{BagnoldScene, Scene, SolverMethod};
+use crate::scene::{BagnoldScene, LayerCase, Scene, SolverMethod};
 use crate::state_hash;
 use crate::summary::{Model, Quantity, Summary};
 use crate::table::Table;
-use colluvium_continuum::bagnold::{BagnoldCase, BagnoldSolution};
+use colluvium_continuum::bagnold::BagnoldSolution;
 use colluvium_continuum::flow::{Marching, YieldMethod};
 use colluvium_continuum::layer::{Options, Progress};
-use colluvium_continuum::rheology::MuI;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -25,27 +24,6 @@ pub const LEFT_OUT: [&str; 6] = [
     "advection of momentum (zero in a flow along the plane)",
     "non-local effects near the base",
 ];
-
-/// The case that a scene describes.
-pub fn case(scene: &BagnoldScene) -> BagnoldCase {
-    let r = &scene.rheology;
-    BagnoldCase {
-        slope: scene.slope_degrees.to_radians(),
-        depth: scene.depth,
-        gravity: scene.gravity,
-        rheology: MuI {
-            mu_s: r.mu_s,
-            mu_2: r.mu_2,
-            i_0: r.i_0,
-            diameter: r.diameter,
-            solid_fraction: r.solid_fraction,
-            grain_density: r.grain_density,
-            cohesion: r.cohesion,
-        },
-        cells: scene.cells(),
-        columns: (scene.grid.columns > 1).then_some(scene.grid.columns as usize),
-    }
-}
 
 /// The solver's settings that a scene describes.
 pub fn options(scene: &BagnoldScene) -> Options {
@@ -71,7 +49,7 @@ pub fn solve(
     progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<(BagnoldSolution, f64), colluvium_continuum::Error> {
     let start = Instant::now();
-    let solution = case(scene).solve(&options(scene), progress)?;
+    let solution = LayerCase::of(scene)?.solve(&options(scene), progress)?;
     Ok((solution, start.elapsed().as_secs_f64()))
 }
 
@@ -87,7 +65,9 @@ pub fn failure(error: colluvium_continuum::Error) -> Failure {
 pub(super) fn check(scene: &Scene, body: &BagnoldScene) -> Result<(), Failure> {
     let named =
         |error: colluvium_continuum::Error| Failure::Input(format!("{}: {error}", scene.origin));
-    case(body).validate().map_err(named)?;
+    LayerCase::of(body)
+        .and_then(|layer| layer.validate())
+        .map_err(named)?;
     options(body).marching.validate().map_err(named)
 }
 
@@ -120,7 +100,7 @@ pub(super) fn run(scene: &BagnoldScene, under: &mut Under) -> Result<Findings, F
         solution.steps, solution.linear_solves
     ));
     let mut summary = Summary::begun("bagnold", "run");
-    describe(&mut summary, scene, &solution, wall_s);
+    describe(&mut summary, scene, &solution, wall_s)?;
     // One thread computes the layer, however many the pool has.
     summary.cost.threads = 1;
     Ok(Findings {
@@ -167,8 +147,8 @@ pub fn describe(
     scene: &BagnoldScene,
     solution: &BagnoldSolution,
     wall_s: f64,
-) {
-    let case = case(scene);
+) -> Result<(), Failure> {
+    let layer = LayerCase::of(scene).map_err(failure)?;
     let cells = solution.cells as u64;
     summary.model = Model {
         grains: 0,
@@ -179,7 +159,7 @@ pub fn describe(
         left_out: LEFT_OUT.map(String::from).to_vec(),
     };
     summary.cost = Cost::measured(wall_s, 1, 0, cells * solution.steps as u64);
-    let weight = case.exact_shear_stress(0.0);
+    let weight = layer.base_shear_stress();
     if weight > 0.0 {
         summary.ledger.momentum_relative =
             Some((solution.boundary_shear_stress[0] - weight).abs() / weight);
@@ -187,7 +167,7 @@ pub fn describe(
     summary.state_hash = state_hash::of(&[&solution.u, &solution.p]);
     summary.remarks.extend(scene.law_remarks());
     let exact = "exact Bagnold profile";
-    let rests = case.slope.tan() <= case.rheology.mu_s;
+    let rests = layer.rests();
     let error_unit = if rests { "m/s" } else { "1" };
     summary.put(
         "velocity_error_l2",
@@ -227,18 +207,18 @@ pub fn describe(
         Quantity::new(solution.linear_solves as f64, "1"),
     );
     if !rests {
-        let inertial_number = case.rheology.inertial_number_at(case.slope.tan());
+        let inertial_number = base_inertial_number(scene, &layer);
         summary.put(
             "inertial_number",
-            Quantity::new(inertial_number, "1").from("where μ(I) is the slope's tangent"),
+            Quantity::new(inertial_number, "1").from("on the base; without cohesion everywhere"),
         );
         summary
             .remarks
-            .extend(validity_remark(scene, inertial_number));
+            .extend(validity_remark(scene, &layer, inertial_number));
     } else {
         summary
             .remarks
-            .push("The slope lies below atan(μ_s): the layer rests.".into());
+            .push("The slope lies below what friction and cohesion hold: the layer rests.".into());
     }
     if solution.ill_posed_fraction > 0.0 {
         summary.remarks.push(format!(
@@ -246,13 +226,26 @@ pub fn describe(
             100.0 * solution.ill_posed_fraction
         ));
     }
+    Ok(())
+}
+
+/// Inertial number on the base, I = γ̇ d √(ρ_s/p).
+pub fn base_inertial_number(scene: &BagnoldScene, layer: &LayerCase) -> f64 {
+    let r = &scene.rheology;
+    layer.base().0 * r.diameter * (r.grain_density / layer.base_pressure()).sqrt()
 }
 
 /// Says so when the flow lies outside what the rheology was measured for.
-pub fn validity_remark(scene: &BagnoldScene, inertial_number: f64) -> Option<String> {
-    let range = scene.rheology.valid_i.as_deref()?;
-    let [low, high] = range else { return None };
-    (inertial_number < *low || inertial_number > *high).then(|| {
+pub fn validity_remark(
+    scene: &BagnoldScene,
+    layer: &LayerCase,
+    inertial_number: f64,
+) -> Option<String> {
+    let [low, high] = match scene.rheology.valid_i.as_deref() {
+        Some([low, high]) => [*low, *high],
+        _ => layer.valid_inertial_numbers()?,
+    };
+    (inertial_number < low || inertial_number > high).then(|| {
         format!(
             "Outside the calibration: I = {inertial_number:.4} at {} degrees, but the rheology was measured for I in [{low:.4}, {high:.4}].",
             scene.slope_degrees
