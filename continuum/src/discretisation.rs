@@ -207,6 +207,16 @@ impl Discretisation {
         &self.divergence
     }
 
+    /// Superposes a uniform strain rate (γ₁, γ₂) on that of the unknown velocities, which are then
+    /// those of a disturbance.
+    pub(crate) fn add_uniform_strain_rate(&mut self, rate: [f64; COMPONENTS]) {
+        for point in &mut self.points {
+            for (offset, rate) in point.offset.iter_mut().zip(rate) {
+                *offset += rate;
+            }
+        }
+    }
+
     /// Force of a body acceleration and of the pressure outside the grid on each velocity.
     pub fn load(&self, acceleration: [f64; DIMENSIONS]) -> Vec<f64> {
         let mut load = self.boundary_load.clone();

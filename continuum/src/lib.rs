@@ -16,7 +16,8 @@
 //!
 //! # Cases with exact solutions
 //! [`bagnold`] (a layer on an incline), [`plane_shear`] (between plates under a load) and
-//! [`vertical_chute`] (between vertical walls, with a rigid plug).
+//! [`vertical_chute`] (between vertical walls, with a rigid plug); [`plane_wave`] measures how small
+//! disturbances of a uniform flow grow or decay.
 //!
 //! ```
 //! use std::ops::ControlFlow;
@@ -46,6 +47,7 @@ pub mod grid;
 pub mod layer;
 pub mod linear_solver;
 pub mod plane_shear;
+pub mod plane_wave;
 pub mod rheology;
 pub mod units;
 pub mod vertical_chute;
