@@ -160,6 +160,7 @@ impl<L: ShearLaw> BagnoldCase<L> {
                 -self.gravity * self.slope.cos(),
             ],
             rheology: &self.rheology,
+            side_walls: None,
         };
         layer.solve(
             options,

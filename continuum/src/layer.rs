@@ -11,6 +11,7 @@ use crate::flow::{Flow, Marching, StepRecord, YieldMethod};
 use crate::grid::{Axis, Boundary, DIMENSIONS, Grid};
 use crate::rheology::Rheology;
 use crate::units::Units;
+use crate::wall_friction::SideWalls;
 
 /// Settings of a computation, in natural units of the case (time √(H/g) in a layer of depth H).
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -92,6 +93,7 @@ pub(crate) struct Layer<'a, L> {
     pub high: Boundary,
     pub acceleration: [f64; DIMENSIONS],
     pub rheology: &'a L,
+    pub side_walls: Option<SideWalls>,
 }
 
 /// Fewest cells across a layer: a pressure is extrapolated from two.
@@ -127,6 +129,10 @@ impl<L: Rheology> Layer<'_, L> {
                 velocity: velocity / self.units.velocity,
                 pressure: pressure / self.units.stress(),
             },
+            Boundary::CoulombWall { velocity, friction } => Boundary::CoulombWall {
+                velocity: velocity / self.units.velocity,
+                friction: friction.in_units(&self.units),
+            },
             Boundary::FreeSlip | Boundary::FreeSurface => boundary,
         }
     }
@@ -150,15 +156,29 @@ impl<L: Rheology> Layer<'_, L> {
             low: self.boundary_in_units(self.low),
             high: self.boundary_in_units(self.high),
         };
-        let mut flow = Flow::at_rest(
-            Grid::new([along, across])?,
-            options.threshold_pressure,
-            self.rheology.in_units(&units),
-            self.acceleration.map(|a| a / units.acceleration()),
-            options.method,
-            // A guess from which Newton's method starts: the pressure at rest.
-            |height| exact_pressure(height * units.length) / units.stress(),
-        )?;
+        let grid = Grid::new([along, across])?;
+        let law = self.rheology.in_units(&units);
+        let acceleration = self.acceleration.map(|a| a / units.acceleration());
+        // A guess from which Newton's method starts: the pressure at rest.
+        let pressure = |height: f64| exact_pressure(height * units.length) / units.stress();
+        let mut flow = match self.side_walls {
+            None => Flow::at_rest(
+                grid,
+                options.threshold_pressure,
+                law,
+                acceleration,
+                options.method,
+                pressure,
+            )?,
+            Some(walls) => Flow::between_side_walls(
+                grid,
+                walls.in_units(&units),
+                law,
+                acceleration,
+                options.method,
+                pressure,
+            )?,
+        };
         let mut step = 0;
         let natural = flow.march(&options.marching, &mut |record| {
             step += 1;

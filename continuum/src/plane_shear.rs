@@ -100,6 +100,7 @@ impl<L: ShearLaw> PlaneShearCase<L> {
             },
             acceleration: [0.0, 0.0],
             rheology: &self.rheology,
+            side_walls: None,
         };
         layer.solve(
             options,

@@ -130,6 +130,7 @@ impl<L: ShearLaw> VerticalChuteCase<L> {
             },
             acceleration: [self.gravity, 0.0],
             rheology: &self.rheology,
+            side_walls: None,
         };
         layer.solve(
             options,

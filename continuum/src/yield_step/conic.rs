@@ -243,7 +243,10 @@ impl ConicProgram {
         for ((point, s), pressure) in points.zip(pressures) {
             let gamma = point.strain_rate(&state.u);
             let rate = strain_rate_norm(gamma);
-            let threshold = problem.rheology.threshold(rate, *pressure).stress;
+            let threshold = point
+                .law
+                .threshold(problem.rheology, rate, *pressure)
+                .stress;
             let excess = (strain_rate_norm(*s) - threshold).max(0.0);
             let idle = (threshold * rate - s[0] * gamma[0] - s[1] * gamma[1]).max(0.0);
             let miss = excess + idle / rate.max(YIELDED_RATE);
@@ -286,8 +289,8 @@ impl<R: Rheology> YieldSolver<R> for ConicProgram {
                 .collect();
             let thresholds: Vec<Threshold> = rates
                 .iter()
-                .zip(&pressure)
-                .map(|(rate, p)| problem.rheology.threshold(*rate, *p))
+                .zip(points.iter().zip(&pressure))
+                .map(|(rate, (point, p))| point.law.threshold(problem.rheology, *rate, *p))
                 .collect();
             let before = trial.u.clone();
             report.iterations += 1;
