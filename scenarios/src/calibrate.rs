@@ -17,7 +17,7 @@ use crate::run::{self, Ended, RunOptions, incline, precheck};
 use crate::run_directory::RunDirectory;
 use crate::scene::{InclineScene, Scene, SceneBody};
 use crate::summary::Status;
-use colluvium_coupling::calibration::MuIFit;
+use colluvium_coupling::calibration::{MuIFit, friction_table};
 use colluvium_coupling::campaign::{
     Bracket, CampaignError, CampaignEvent, CampaignResult, CampaignSpec, GuessedLaw, run_campaign,
 };
@@ -355,6 +355,7 @@ fn rheology_file(
         solid_fraction_error: Some(fit.solid_fraction_error),
         grain_density: Some(body.grains.density),
         valid_i: Some(fit.valid_i),
+        table: friction_table(&result.points),
         identified: Some(fit.identified),
         good: Some(result.verdict.good),
         covariance: Some(fit.covariance),

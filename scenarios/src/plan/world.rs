@@ -173,6 +173,10 @@ fn wall_in_words(wall: &Wall) -> String {
             "truncated cone, radii {} and {} m, {} m long",
             f.radii[0], f.radii[1], f.height
         ),
+        Shape::Cuboid(c) => {
+            let [x, y, z] = (2.0 * c.half_sides).into();
+            format!("block of {x} m x {y} m x {z} m")
+        }
         Shape::SphereShell(s) => format!("sphere of radius {} m", s.radius),
         Shape::Mesh(mesh) => format!("mesh of {} triangles", mesh.triangles().len()),
     };
