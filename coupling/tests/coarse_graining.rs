@@ -81,6 +81,8 @@ fn network_at_rest(seed: u64) -> Snapshot {
                     force,
                     arm,
                     partner_arm,
+                    torque: Vector3::zeros(),
+                    partner_torque: Vector3::zeros(),
                 });
             }
             net[i] += force;
@@ -95,6 +97,8 @@ fn network_at_rest(seed: u64) -> Snapshot {
             force: -net[i],
             arm: g.radius * random_vector(&mut rng),
             partner_arm: Vector3::zeros(),
+            torque: Vector3::zeros(),
+            partner_torque: Vector3::zeros(),
         });
     }
     Snapshot {
@@ -183,6 +187,8 @@ fn stack() -> Snapshot {
             force: Vector3::new(0.0, 0.0, 2.0 * g * (4 - i) as f64),
             arm: Vector3::new(0.0, 0.0, -0.5),
             partner_arm: Vector3::new(0.0, 0.0, 0.5),
+            torque: Vector3::zeros(),
+            partner_torque: Vector3::zeros(),
         })
         .collect();
     Snapshot {
