@@ -248,12 +248,21 @@ pub fn contacts(snapshot: &Snapshot) -> Frame {
             .map(Into::into)
             .collect(),
         fields: vec![
-            field("force", "N", vectors(links.iter().map(|link| link.contact.force))),
+            field(
+                "force",
+                "N",
+                vectors(links.iter().map(|link| link.contact.force)),
+            ),
             field("overlap", "m", scalars(|link| link.contact.overlap)),
             field(
                 "first",
                 "id of the grain the force acts on",
-                Values::Counts(links.iter().map(|l| i64::from(grains[l.contact.grain].id)).collect()),
+                Values::Counts(
+                    links
+                        .iter()
+                        .map(|l| i64::from(grains[l.contact.grain].id))
+                        .collect(),
+                ),
             ),
             field(
                 "second",
@@ -261,8 +270,16 @@ pub fn contacts(snapshot: &Snapshot) -> Frame {
                 Values::Counts(links.iter().map(|l| other(&l.contact)).collect()),
             ),
             field("arm", "m", vectors(links.iter().map(|l| l.contact.arm))),
-            field("torque", "N m", vectors(links.iter().map(|l| l.contact.torque))),
-            field("other_torque", "N m", vectors(links.iter().map(|l| l.contact.partner_torque))),
+            field(
+                "torque",
+                "N m",
+                vectors(links.iter().map(|l| l.contact.torque)),
+            ),
+            field(
+                "other_torque",
+                "N m",
+                vectors(links.iter().map(|l| l.contact.partner_torque)),
+            ),
             field(
                 "kind",
                 "0 pair of grains, 1 wall, 2 bond",

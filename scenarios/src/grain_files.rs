@@ -112,9 +112,7 @@ fn snapshot(instant: &Instant, unsaid: &Unsaid) -> Result<Snapshot, String> {
             .mass
             .or(density.map(|rho| rho * volume))
             .filter(|m| *m > 0.0 && m.is_finite())
-            .ok_or_else(|| {
-                format!("grain {} has no positive mass: give --density", row.id)
-            })?;
+            .ok_or_else(|| format!("grain {} has no positive mass: give --density", row.id))?;
         let numbers = [row.position, row.velocity, row.spin];
         if !numbers.iter().flat_map(|v| v.iter()).all(|x| x.is_finite()) {
             return Err(format!("grain {} has a number that is not finite", row.id));
@@ -123,7 +121,8 @@ fn snapshot(instant: &Instant, unsaid: &Unsaid) -> Result<Snapshot, String> {
             return Err(format!("two grains have the id {}", row.id));
         }
         grains.push(GrainSample {
-            id: u32::try_from(row.id).map_err(|_| format!("the id {} is no number of a grain", row.id))?,
+            id: u32::try_from(row.id)
+                .map_err(|_| format!("the id {} is no number of a grain", row.id))?,
             position: domain.wrap(row.position),
             velocity: row.velocity,
             spin: row.spin,
@@ -234,7 +233,9 @@ fn domain(instant: &Instant, unsaid: &Unsaid) -> Result<Domain, String> {
     }
     let lengths = domain.lengths();
     if !lengths.iter().all(|l| *l > 0.0 && l.is_finite()) {
-        return Err(format!("the box is {lengths:?} m long: all must be positive"));
+        return Err(format!(
+            "the box is {lengths:?} m long: all must be positive"
+        ));
     }
     Ok(domain)
 }

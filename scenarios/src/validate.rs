@@ -42,7 +42,10 @@ impl Check {
 
     /// The difference in joint standard errors.
     pub fn in_errors(&self) -> Option<f64> {
-        let joint = self.error.unwrap_or(0.0).hypot(self.reference_error.unwrap_or(0.0));
+        let joint = self
+            .error
+            .unwrap_or(0.0)
+            .hypot(self.reference_error.unwrap_or(0.0));
         (joint > 0.0).then(|| self.difference() / joint)
     }
 
@@ -123,8 +126,15 @@ pub fn validate(name: Option<&str>, options: &Options) -> Result<(PathBuf, usize
     }
     let missed = all.iter().filter(|c| c.agrees() == Some(false)).count();
     let judged = all.iter().filter(|c| c.allowed.is_some()).count();
-    let lead = format!("{} of {judged} judged figures agree with their references.", judged - missed);
-    let text = page("Validation", &lead, &html! { @for part in &body { (part) } });
+    let lead = format!(
+        "{} of {judged} judged figures agree with their references.",
+        judged - missed
+    );
+    let text = page(
+        "Validation",
+        &lead,
+        &html! { @for part in &body { (part) } },
+    );
     let report = options.out.join("report.html");
     write(&report, text.as_bytes())?;
     let json = serde_json::to_vec_pretty(&all).map_err(|e| Failure::Run(e.to_string()))?;

@@ -129,8 +129,12 @@ pub fn read_frame(path: &Path) -> Result<Frame, Failure> {
 
 /// Reads all frames of a file that [`write()`] has written.
 pub fn read_series(path: &Path) -> Result<Vec<Frame>, Failure> {
-    read(path)
-        .map_err(|error| Failure::Run(format!("cannot read the series {}: {error}", path.display())))
+    read(path).map_err(|error| {
+        Failure::Run(format!(
+            "cannot read the series {}: {error}",
+            path.display()
+        ))
+    })
 }
 
 fn read_one(path: &Path) -> hdf5::Result<Frame> {

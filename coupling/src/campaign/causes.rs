@@ -1,7 +1,9 @@
 //! What a continuum run inherits from a fit, which law the points support, and why one law may not describe them.
 
-use super::verdict::Evidence;
-use crate::calibration::{Alternative, Law, MuIFit, Posterior, mu_of_i, pressure_ratio};
+use super::verdict::{Evidence, LARGEST_MISFIT};
+use crate::calibration::{
+    Alternative, Law, LocalPoint, MuIFit, Posterior, mu_of_i, pressure_ratio,
+};
 
 /// Where the error of the law matters to a continuum: in an inclined flow u ∝ I, and I follows from μ(I) = tan θ.
 pub(super) fn inherited(fit: &MuIFit, posterior: &Option<Posterior>, text: &mut Vec<String>) {
@@ -39,7 +41,7 @@ pub(super) fn inherited(fit: &MuIFit, posterior: &Option<Posterior>, text: &mut 
 const SUPPORTED: f64 = 0.05;
 
 /// Which of the competing laws the points support.
-pub(super) fn laws(alternatives: &[Alternative], text: &mut Vec<String>) {
+pub(super) fn laws(alternatives: &[Alternative], points: &[LocalPoint], text: &mut Vec<String>) {
     let Some(best) = alternatives.first() else {
         return;
     };
@@ -55,6 +57,18 @@ pub(super) fn laws(alternatives: &[Alternative], text: &mut Vec<String>) {
         })
         .collect();
     text.push(format!("Support by Akaike weight: {}.", list.join(", ")));
+    let mean = points.iter().map(|p| p.friction).sum::<f64>() / points.len().max(1) as f64;
+    let least = alternatives
+        .iter()
+        .map(|a| a.rms_residual)
+        .fold(f64::INFINITY, f64::min);
+    if least > LARGEST_MISFIT * mean {
+        text.push(format!(
+            "None of these laws describes the points to {:.0} % of mu.",
+            100.0 * LARGEST_MISFIT
+        ));
+        return;
+    }
     let jop = alternatives.iter().find(|a| a.law == Law::Jop);
     if best.law != Law::Jop && jop.is_none_or(|a| a.weight < SUPPORTED) {
         let values: Vec<String> = best

@@ -36,7 +36,7 @@ pub(super) struct Evidence<'a> {
 }
 
 /// Root-mean-square residual, relative to μ, above which μ(I) does not describe the material.
-const LARGEST_MISFIT: f64 = 0.03;
+pub(super) const LARGEST_MISFIT: f64 = 0.03;
 /// Largest |σ_zz/weight − 1| of a trustworthy flow.
 const LARGEST_WEIGHT_ERROR: f64 = 0.02;
 /// Overlap over the harmonic mean of the radii above which grains are too soft for the limit of hard grains.
@@ -55,7 +55,7 @@ pub(super) fn judge(e: &Evidence) -> Verdict {
             inherited(fit, e.posterior, &mut text);
         }
     }
-    laws(e.alternatives, &mut text);
+    laws(e.alternatives, e.points, &mut text);
     causes(e, &mut good, &mut text);
     if let Ok(fit) = e.fit_zz {
         text.push(format!(

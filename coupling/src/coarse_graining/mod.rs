@@ -12,7 +12,8 @@
 //!   the force f on the grain and the arm a from its centre to the contact point, so each pair is split at
 //!   its contact point; bonds count like contacts;
 //! - wall force t = Σ f W(z − z_c) at contacts with fixed grains and walls;
-//! - kinetic stress σᵏ = −⟨ρ u′u′⟩, temperature T = tr⟨u′u′⟩/3.
+//! - kinetic stress σᵏ = −⟨ρ u′u′⟩, temperature T = tr⟨u′u′⟩/3, about a velocity that is linear within the layer and
+//!   in time: the speed that a flow gains while it is averaged is no fluctuation.
 //!
 //! Then ∂ₜj + ∇·(ρ u u) = ∇·σ + t + ρ g holds at any instant, kernel and height, by construction.
 //!

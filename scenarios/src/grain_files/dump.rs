@@ -31,7 +31,10 @@ pub(super) fn read(path: &Path, unsaid: &Unsaid) -> Result<Vec<Instant>, String>
         .map(|table| {
             let links = contacts.remove(&table.step);
             if unsaid.contacts.is_some() && links.is_none() {
-                return Err(format!("step {}: the contacts have no such step", table.step));
+                return Err(format!(
+                    "step {}: the contacts have no such step",
+                    table.step
+                ));
             }
             let time = match (table.time, unsaid.timestep) {
                 (Some(time), _) => time,
@@ -48,9 +51,11 @@ pub(super) fn read(path: &Path, unsaid: &Unsaid) -> Result<Vec<Instant>, String>
 }
 
 fn tables(path: &Path, what: &str) -> Result<Vec<Table>, String> {
-    let text =
-        std::fs::read_to_string(path).map_err(|e| format!("cannot read the file: {e}"))?;
-    let mut lines = text.lines().enumerate().map(|(k, line)| (k + 1, line.trim()));
+    let text = std::fs::read_to_string(path).map_err(|e| format!("cannot read the file: {e}"))?;
+    let mut lines = text
+        .lines()
+        .enumerate()
+        .map(|(k, line)| (k + 1, line.trim()));
     let mut list = Vec::new();
     let mut table = Table::default();
     let mut count = 0;
@@ -86,7 +91,10 @@ fn tables(path: &Path, what: &str) -> Result<Vec<Table>, String> {
             }
             _ if item.starts_with("BOX BOUNDS") => {
                 let flags: Vec<&str> = item.split_whitespace().skip(2).collect();
-                if flags.iter().any(|f| ["xy", "xz", "yz", "abc", "origin"].contains(f)) {
+                if flags
+                    .iter()
+                    .any(|f| ["xy", "xz", "yz", "abc", "origin"].contains(f))
+                {
                     return Err("a box that is not rectangular cannot be read".into());
                 }
                 let mut domain = Domain {
@@ -100,7 +108,9 @@ fn tables(path: &Path, what: &str) -> Result<Vec<Table>, String> {
                         .map(|word| parse(word, "a bound of the box"))
                         .collect::<Result<_, _>>()?;
                     let [low, high] = bounds[..] else {
-                        return Err(format!("behind line {number}: two bounds an axis are expected"));
+                        return Err(format!(
+                            "behind line {number}: two bounds an axis are expected"
+                        ));
                     };
                     (domain.lower[axis], domain.upper[axis]) = (low, high);
                     domain.periodic[axis] = flags.get(axis) == Some(&"pp");
@@ -108,7 +118,10 @@ fn tables(path: &Path, what: &str) -> Result<Vec<Table>, String> {
                 table.domain = Some(domain);
             }
             _ if item.starts_with(what) => {
-                table.columns = item[what.len()..].split_whitespace().map(String::from).collect();
+                table.columns = item[what.len()..]
+                    .split_whitespace()
+                    .map(String::from)
+                    .collect();
                 for _ in 0..count {
                     let row: Vec<f64> = next("a row")?
                         .split_whitespace()
@@ -154,8 +167,16 @@ fn rows(table: &Table) -> Result<Vec<Row>, String> {
     };
     let id = need(&["id"])?;
     let place = match first(&["x", "xu"]) {
-        Some(_) => [need(&["x", "xu"])?, need(&["y", "yu"])?, need(&["z", "zu"])?],
-        None => [need(&["xs", "x"])?, need(&["ys", "y"])?, need(&["zs", "z"])?],
+        Some(_) => [
+            need(&["x", "xu"])?,
+            need(&["y", "yu"])?,
+            need(&["z", "zu"])?,
+        ],
+        None => [
+            need(&["xs", "x"])?,
+            need(&["ys", "y"])?,
+            need(&["zs", "z"])?,
+        ],
     };
     let scaled = first(&["x", "xu"]).is_none();
     let (radius, diameter) = (column("radius"), column("diameter"));
@@ -181,9 +202,7 @@ fn rows(table: &Table) -> Result<Vec<Row>, String> {
                 position: unscale(vector(place)),
                 velocity: vector(velocity),
                 spin: spin.map_or_else(Vector3::zeros, vector),
-                radius: radius
-                    .map(|k| row[k])
-                    .or(diameter.map(|k| 0.5 * row[k])),
+                radius: radius.map(|k| row[k]).or(diameter.map(|k| 0.5 * row[k])),
                 mass: mass.map(|k| row[k]),
                 density: density.map(|k| row[k]),
                 fixed: false,
@@ -206,13 +225,19 @@ fn links(table: &Table, unsaid: &Unsaid) -> Result<Vec<Link>, String> {
         let find = |name: &String| {
             let place = table.columns.iter().position(|c| c == name);
             place.ok_or_else(|| {
-                format!("no column {name}; the dump has: {}", table.columns.join(", "))
+                format!(
+                    "no column {name}; the dump has: {}",
+                    table.columns.join(", ")
+                )
             })
         };
         names.iter().map(find).collect::<Result<_, _>>()?
     };
     if table.columns.len() < columns.len() {
-        return Err(format!("{} columns: at least 5 are needed", table.columns.len()));
+        return Err(format!(
+            "{} columns: at least 5 are needed",
+            table.columns.len()
+        ));
     }
     Ok(table
         .rows

@@ -17,7 +17,9 @@ impl<'a> Cursor<'a> {
             let rest = self.bytes.get(self.at..).filter(|r| !r.is_empty())?;
             let end = rest.iter().position(|b| *b == b'\n').unwrap_or(rest.len());
             self.at += end + 1;
-            let line = std::str::from_utf8(&rest[..end]).unwrap_or("\u{fffd}").trim();
+            let line = std::str::from_utf8(&rest[..end])
+                .unwrap_or("\u{fffd}")
+                .trim();
             if !line.is_empty() {
                 return Some(line);
             }
@@ -39,7 +41,8 @@ impl<'a> Cursor<'a> {
             return (0..count)
                 .map(|_| {
                     let word = self.word().ok_or("the file ends within numbers")?;
-                    word.parse().map_err(|_| format!("`{word}` is not a number"))
+                    word.parse()
+                        .map_err(|_| format!("`{word}` is not a number"))
                 })
                 .collect();
         }
@@ -147,7 +150,14 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<Instant>, String> {
             }
             "LOOKUP_TABLE" => {
                 let n = count_of(&words, 2)?;
-                cursor.numbers(4 * n, if cursor.binary { "unsigned_char" } else { "float" })?;
+                cursor.numbers(
+                    4 * n,
+                    if cursor.binary {
+                        "unsigned_char"
+                    } else {
+                        "float"
+                    },
+                )?;
             }
             _ => {}
         }
@@ -169,7 +179,10 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<Instant>, String> {
     if radius.is_none() {
         let mut names: Vec<&str> = fields.keys().map(String::as_str).collect();
         names.sort_unstable();
-        return Err(format!("no field `radius` over the points; there are: {}", names.join(", ")));
+        return Err(format!(
+            "no field `radius` over the points; there are: {}",
+            names.join(", ")
+        ));
     }
     let density = list(&["density"], 1);
     let rows = (0..n)
