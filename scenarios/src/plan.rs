@@ -4,6 +4,7 @@ mod bed;
 mod law;
 mod world;
 
+use crate::calibrate;
 use crate::failure::Failure;
 use crate::run;
 use crate::run::step;
@@ -183,7 +184,24 @@ fn incline(scene: &Scene, body: &InclineScene) -> Result<String, Failure> {
         "calibrate",
         &format!(
             "flows at {:?} degrees, where a flow stops in [{}, {}], where rest ends in [{}, {}]",
-            c.flow_degrees, c.stop.low, c.stop.high, c.onset.low, c.onset.high
+            calibrate::flow_degrees(body),
+            c.stop.low,
+            c.stop.high,
+            c.onset.low,
+            c.onset.high
+        ),
+    );
+    let [own, best] = calibrate::prospects(body);
+    let tells = |p: &colluvium_coupling::campaign::Prospect| {
+        let [a, b, c] = p.errors;
+        format!("±{a:.3}, ±{b:.3}, ±{c:.3}")
+    };
+    lines.say(
+        "design",
+        &format!(
+            "if the guess is true these flows tell mu_s, mu_2, i_0 to {}; as many D-optimal slopes (flow_degrees = []) to {}",
+            tells(&own),
+            tells(&best)
         ),
     );
     Ok(lines.0)

@@ -105,15 +105,30 @@ pub struct Provenance {
     pub verdict: String,
 }
 
+/// Calibrated laws that come with the program, by name: what `rheology.file` may say in the place of a path.
+pub const BUNDLED: [(&str, &str); 3] = [
+    ("moderate", include_str!("../rheologies/moderate.toml")),
+    ("gravel", include_str!("../rheologies/gravel.toml")),
+    ("glass", include_str!("../rheologies/glass.toml")),
+];
+
 impl RheologyFile {
-    /// Reads and checks a file.
+    /// Reads and checks a file, or the bundled law of that name.
     pub fn read(path: &Path) -> Result<RheologyFile, SceneError> {
         let fail = |message: String| SceneError::Rheology {
             path: path.display().to_string(),
             message,
         };
-        let text = std::fs::read_to_string(path)
-            .map_err(|error| fail(format!("cannot read the file: {error}")))?;
+        let bundled = BUNDLED.iter().find(|(name, _)| path == Path::new(name));
+        let text = match bundled {
+            Some((_, text)) if !path.exists() => (*text).to_owned(),
+            _ => std::fs::read_to_string(path).map_err(|error| {
+                let names = BUNDLED.map(|(name, _)| name).join(", ");
+                fail(format!(
+                    "cannot read the file: {error} (bundled laws: {names})"
+                ))
+            })?,
+        };
         let law: RheologyFile =
             toml::from_str(&text).map_err(|error| fail(error.to_string().trim().to_owned()))?;
         law.check().map_err(fail)?;
