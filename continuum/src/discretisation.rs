@@ -8,6 +8,7 @@
 //! dissipated power.
 
 use crate::grid::{Axis, Boundary, DIMENSIONS, Grid};
+use crate::wall_friction::{PointLaw, SideWalls};
 
 /// Components of the strain rate (and of the deviatoric stress) in a plane flow.
 pub const COMPONENTS: usize = 2;
@@ -44,6 +45,8 @@ pub struct QuadraturePoint {
     pressure_weights: [f64; MAX_PRESSURES],
     /// The boundary across z on which the corner lies: 0 low, 1 high.
     pub(crate) side: Option<usize>,
+    /// Whose threshold holds here.
+    pub(crate) law: PointLaw,
 }
 
 impl QuadraturePoint {
@@ -58,6 +61,7 @@ impl QuadraturePoint {
             pressure_count: 0,
             pressure_weights: [0.0; MAX_PRESSURES],
             side: None,
+            law: PointLaw::Material,
         }
     }
 
@@ -207,6 +211,42 @@ impl Discretisation {
         &self.divergence
     }
 
+    /// Adds the friction of side walls: points that take the velocity for a rate, one for each pair of
+    /// a face across x and one across z of a cell.
+    pub(crate) fn add_side_walls(&mut self, walls: SideWalls) {
+        let grid = &self.grid;
+        let [columns, rows] = [grid.axes()[0].cells(), grid.axes()[1].cells()];
+        let faces_of = |axis: usize, cell: usize| match grid.axes()[axis].faces_of_cell(cell) {
+            None => vec![0],
+            Some(pair) => pair.to_vec(),
+        };
+        for cell in (0..rows).flat_map(|k| (0..columns).map(move |i| [i, k])) {
+            let [xs, zs] = [0, 1].map(|axis| faces_of(axis, cell[axis]));
+            for (&fx, &fz) in xs.iter().flat_map(|x| zs.iter().map(move |z| (x, z))) {
+                let mut point =
+                    QuadraturePoint::new(grid.cell_volume() / (xs.len() * zs.len()) as f64);
+                for (component, face) in [(0, [fx, cell[1]]), (1, [cell[0], fz])] {
+                    if let Some(unknown) = grid.unknown(component, face) {
+                        point.add_velocity(unknown, component, 1.0);
+                    }
+                }
+                point.add_pressure(grid.cell(cell), 1.0);
+                point.law = PointLaw::SideWalls(walls);
+                self.points.push(point);
+            }
+        }
+    }
+
+    /// Superposes a uniform strain rate (γ₁, γ₂) on that of the unknown velocities, which are then
+    /// those of a disturbance.
+    pub(crate) fn add_uniform_strain_rate(&mut self, rate: [f64; COMPONENTS]) {
+        for point in &mut self.points {
+            for (offset, rate) in point.offset.iter_mut().zip(rate) {
+                *offset += rate;
+            }
+        }
+    }
+
     /// Force of a body acceleration and of the pressure outside the grid on each velocity.
     pub fn load(&self, acceleration: [f64; DIMENSIONS]) -> Vec<f64> {
         let mut load = self.boundary_load.clone();
@@ -265,6 +305,13 @@ fn push_points(
                 ThresholdPressure::Cell => point.add_pressure(grid.cell(cell), 1.0),
             }
             point.side = grid.axes()[1].boundary_at(fz).map(|_| usize::from(fz > 0));
+            for (axis, face) in [(0, fx), (1, fz)] {
+                if let Some(Boundary::CoulombWall { friction, .. }) =
+                    grid.axes()[axis].boundary_at(face)
+                {
+                    point.law = PointLaw::OnWall(friction);
+                }
+            }
             points.push(point);
         }
     }

@@ -12,6 +12,7 @@ use crate::discretisation::{Discretisation, ThresholdPressure};
 use crate::error::{Error, require};
 use crate::grid::{DIMENSIONS, Grid};
 use crate::rheology::{Rheology, strain_rate_norm};
+use crate::wall_friction::{PointLaw, SideWalls};
 use crate::yield_step::{
     FlowState, PrimalDual, PrimalDualOptions, RegularisedOptions, RegularisedViscosity, Residuals,
     StepProblem, StepReport, YieldSolver,
@@ -96,6 +97,31 @@ impl Marching {
     }
 }
 
+/// A march under way: with the flow's state it is all that a march needs to go on with the same bits.
+#[derive(Debug, Clone, PartialEq)]
+pub struct March {
+    /// Every step made.
+    pub history: Vec<StepRecord>,
+    /// Time step that growth alone would ask for now.
+    pub scheduled: f64,
+    /// Time step to be tried next.
+    pub next: f64,
+    /// Whether the flow is steady, or its end time reached.
+    pub over: bool,
+}
+
+impl March {
+    /// The beginning of a march.
+    pub fn new(marching: &Marching) -> March {
+        March {
+            history: Vec::new(),
+            scheduled: marching.time_step,
+            next: marching.time_step,
+            over: false,
+        }
+    }
+}
+
 /// What one time step did; all values in natural units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize)]
 pub struct StepRecord {
@@ -124,6 +150,14 @@ const YIELDED: f64 = 1.0 - 1e-6;
 /// Velocity (natural units) below which changes are not measured relative to the velocity.
 const REST_VELOCITY: f64 = 1e-3;
 
+/// A value for each cell from its height.
+fn rows_of(grid: &Grid, value: impl Fn(f64) -> f64) -> Vec<f64> {
+    let [columns, rows] = [grid.axes()[0].cells(), grid.axes()[1].cells()];
+    (0..rows)
+        .flat_map(|k| std::iter::repeat_n(value(grid.centre_height(k)), columns))
+        .collect()
+}
+
 /// A flow on one grid: its state and what advances it.
 pub struct Flow<R> {
     discretisation: Discretisation,
@@ -149,11 +183,37 @@ impl<R: Rheology> Flow<R> {
         method: YieldMethod,
         pressure: impl Fn(f64) -> f64,
     ) -> Result<Self, Error> {
-        let [columns, rows] = [grid.axes()[0].cells(), grid.axes()[1].cells()];
-        let pressure = (0..rows)
-            .flat_map(|k| std::iter::repeat_n(pressure(grid.centre_height(k)), columns))
-            .collect();
+        let pressure = rows_of(&grid, pressure);
         let discretisation = Discretisation::new(grid, threshold_pressure);
+        Self::on(discretisation, rheology, acceleration, method, pressure)
+    }
+
+    /// The same between side walls (in natural units) that a plane grid does not resolve.
+    ///
+    /// # Errors
+    /// As [`at_rest`](Self::at_rest).
+    pub fn between_side_walls(
+        grid: Grid,
+        walls: SideWalls,
+        rheology: R,
+        acceleration: [f64; DIMENSIONS],
+        method: YieldMethod,
+        pressure: impl Fn(f64) -> f64,
+    ) -> Result<Self, Error> {
+        walls.validate()?;
+        let pressure = rows_of(&grid, pressure);
+        let mut discretisation = Discretisation::new(grid, ThresholdPressure::Corner);
+        discretisation.add_side_walls(walls);
+        Self::on(discretisation, rheology, acceleration, method, pressure)
+    }
+
+    fn on(
+        discretisation: Discretisation,
+        rheology: R,
+        acceleration: [f64; DIMENSIONS],
+        method: YieldMethod,
+        pressure: Vec<f64>,
+    ) -> Result<Self, Error> {
         let solver: Box<dyn YieldSolver<R>> = match method {
             YieldMethod::PrimalDual(options) => {
                 Box::new(PrimalDual::new(&discretisation, options)?)
@@ -230,35 +290,65 @@ impl<R: Rheology> Flow<R> {
         progress: &mut dyn FnMut(&StepRecord) -> ControlFlow<()>,
     ) -> Result<Vec<StepRecord>, Error> {
         marching.validate()?;
-        let mut history: Vec<StepRecord> = Vec::new();
-        let mut scheduled = marching.time_step;
-        let mut dt = scheduled;
-        while history.len() < marching.max_steps {
-            if let Some(end) = marching.end_time {
-                dt = dt.min(end - self.time);
-            }
-            let record = self.step(dt)?;
-            history.push(record);
-            if progress(&record).is_break() {
+        let mut march = March::new(marching);
+        while !march.over {
+            self.march_step(marching, &mut march)?;
+            let broken_off = march.history.last().map(&mut *progress);
+            if broken_off.is_some_and(|flow| flow.is_break()) {
                 return Err(Error::Stopped {
-                    steps: history.len(),
+                    steps: march.history.len(),
                 });
             }
-            let is_over = marching
-                .end_time
-                .is_some_and(|end| self.time >= end * (1.0 - 1e-12));
-            if is_over || self.is_steady(&record, marching) {
-                return Ok(history);
-            }
-            scheduled *= marching.growth;
-            dt = scheduled.min(2.0_f64.max(marching.growth) * record.dt);
         }
-        Err(Error::NotSteady {
-            steps: history.len(),
-            time: self.time,
-            acceleration: history.last().map_or(f64::NAN, |r| r.acceleration),
-            tolerance: marching.steady_acceleration,
-        })
+        Ok(march.history)
+    }
+
+    /// Makes the next step of a march.
+    ///
+    /// # Errors
+    /// [`Error::NotConverged`]; [`Error::NotSteady`] if all steps that the settings allow were made.
+    pub fn march_step(&mut self, marching: &Marching, march: &mut March) -> Result<(), Error> {
+        let steps = march.history.len();
+        if steps >= marching.max_steps {
+            return Err(Error::NotSteady {
+                steps,
+                time: self.time,
+                acceleration: march.history.last().map_or(f64::NAN, |r| r.acceleration),
+                tolerance: marching.steady_acceleration,
+            });
+        }
+        let end = marching.end_time;
+        let record = self.step(end.map_or(march.next, |end| march.next.min(end - self.time)))?;
+        march.history.push(record);
+        march.scheduled *= marching.growth;
+        march.next = march
+            .scheduled
+            .min(2.0_f64.max(marching.growth) * record.dt);
+        let is_over = end.is_some_and(|end| self.time >= end * (1.0 - 1e-12));
+        march.over = is_over || self.is_steady(&record, marching);
+        Ok(())
+    }
+
+    /// Takes up a state that [`state`](Self::state) and [`time`](Self::time) gave of such a flow.
+    ///
+    /// # Errors
+    /// In words, if it is that of another grid.
+    pub fn take_up(&mut self, state: FlowState, time: f64) -> Result<(), String> {
+        let own = &self.state;
+        for (name, found, wanted) in [
+            ("velocities", state.u.len(), own.u.len()),
+            ("pressures", state.p.len(), own.p.len()),
+            ("stresses", state.s.len(), own.s.len()),
+        ] {
+            if found != wanted {
+                return Err(format!(
+                    "{found} {name} instead of the {wanted} of this grid"
+                ));
+            }
+        }
+        self.state = state;
+        self.time = time;
+        Ok(())
     }
 
     fn is_steady(&self, record: &StepRecord, marching: &Marching) -> bool {
@@ -346,7 +436,8 @@ impl<R: Rheology> Flow<R> {
         let (mut total, mut yielded, mut ill_posed) = (0.0, 0.0, 0.0);
         for (point, s) in points {
             let pressure = point.pressure(&self.state.p);
-            if pressure <= f64::EPSILON {
+            let is_material = !matches!(point.law, PointLaw::SideWalls(_));
+            if pressure <= f64::EPSILON || !is_material {
                 continue;
             }
             total += point.weight;

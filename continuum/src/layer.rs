@@ -7,10 +7,12 @@ use serde::{Deserialize, Serialize};
 
 use crate::discretisation::ThresholdPressure;
 use crate::error::{Error, require};
-use crate::flow::{Flow, Marching, StepRecord, YieldMethod};
+use crate::flow::{Flow, March, Marching, StepRecord, YieldMethod};
 use crate::grid::{Axis, Boundary, DIMENSIONS, Grid};
-use crate::rheology::{MuI, Rheology};
+use crate::rheology::Rheology;
 use crate::units::Units;
+use crate::wall_friction::SideWalls;
+use crate::yield_step::FlowState;
 
 /// Settings of a computation, in natural units of the case (time √(H/g) in a layer of depth H).
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
@@ -84,14 +86,15 @@ pub struct LayerSolution {
 }
 
 /// A layer to compute; lengths, accelerations and stresses in SI units.
-pub(crate) struct Layer {
+pub(crate) struct Layer<'a, L> {
     pub units: Units,
     pub cells: usize,
     pub columns: Option<usize>,
     pub low: Boundary,
     pub high: Boundary,
     pub acceleration: [f64; DIMENSIONS],
-    pub rheology: MuI,
+    pub rheology: &'a L,
+    pub side_walls: Option<SideWalls>,
 }
 
 /// Fewest cells across a layer: a pressure is extrapolated from two.
@@ -99,25 +102,25 @@ const MIN_CELLS: usize = 2;
 /// Most cells across a layer.
 const MAX_CELLS: usize = 1 << 20;
 
-impl Layer {
-    /// Refuses grids that make no sense.
-    pub(crate) fn validate_grid(cells: usize, columns: Option<usize>) -> Result<(), Error> {
+/// Refuses grids that make no sense.
+pub(crate) fn validate_grid(cells: usize, columns: Option<usize>) -> Result<(), Error> {
+    require(
+        (MIN_CELLS..=MAX_CELLS).contains(&cells),
+        "grid.cells",
+        cells as f64,
+        format!("{MIN_CELLS} to {MAX_CELLS}"),
+    )?;
+    columns.map_or(Ok(()), |columns| {
         require(
-            (MIN_CELLS..=MAX_CELLS).contains(&cells),
-            "grid.cells",
-            cells as f64,
-            format!("{MIN_CELLS} to {MAX_CELLS}"),
-        )?;
-        columns.map_or(Ok(()), |columns| {
-            require(
-                (3..=MAX_CELLS).contains(&columns),
-                "grid.columns",
-                columns as f64,
-                format!("3 to {MAX_CELLS}, or none for a flow that does not vary along x"),
-            )
-        })
-    }
+            (3..=MAX_CELLS).contains(&columns),
+            "grid.columns",
+            columns as f64,
+            format!("3 to {MAX_CELLS}, or none for a flow that does not vary along x"),
+        )
+    })
+}
 
+impl<L: Rheology> Layer<'_, L> {
     fn boundary_in_units(&self, boundary: Boundary) -> Boundary {
         match boundary {
             Boundary::NoSlip { velocity } => Boundary::NoSlip {
@@ -126,6 +129,10 @@ impl Layer {
             Boundary::LoadedWall { velocity, pressure } => Boundary::LoadedWall {
                 velocity: velocity / self.units.velocity,
                 pressure: pressure / self.units.stress(),
+            },
+            Boundary::CoulombWall { velocity, friction } => Boundary::CoulombWall {
+                velocity: velocity / self.units.velocity,
+                friction: friction.in_units(&self.units),
             },
             Boundary::FreeSlip | Boundary::FreeSurface => boundary,
         }
@@ -139,6 +146,18 @@ impl Layer {
         exact_pressure: impl Fn(f64) -> f64,
         progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<LayerSolution, Error> {
+        let mut run = self.begin(options, &exact_pressure)?;
+        run.march(progress)?;
+        Ok(run.solution(exact_velocity, exact_pressure))
+    }
+
+    /// The flow at rest, ready to march.
+    pub(crate) fn begin(
+        &self,
+        options: &Options,
+        exact_pressure: &dyn Fn(f64) -> f64,
+    ) -> Result<LayerRun<L>, Error> {
+        options.marching.validate()?;
         let units = self.units;
         let along = self.columns.map_or(Axis::Flat, |columns| Axis::Periodic {
             length: columns as f64 / self.cells as f64,
@@ -150,27 +169,117 @@ impl Layer {
             low: self.boundary_in_units(self.low),
             high: self.boundary_in_units(self.high),
         };
-        let mut flow = Flow::at_rest(
-            Grid::new([along, across])?,
-            options.threshold_pressure,
-            self.rheology.in_units(&units),
-            self.acceleration.map(|a| a / units.acceleration()),
-            options.method,
-            // A guess from which Newton's method starts: the pressure at rest.
-            |height| exact_pressure(height * units.length) / units.stress(),
-        )?;
-        let mut step = 0;
-        let natural = flow.march(&options.marching, &mut |record| {
-            step += 1;
-            progress(Progress {
-                step,
-                time: record.time * units.time(),
-                dt: record.dt * units.time(),
-                mean_velocity: record.mean_velocity * units.velocity,
-                distance_to_steady: record.acceleration / options.marching.steady_acceleration,
-            })
-        })?;
-        let history: Vec<StepRecord> = natural.iter().map(|r| in_si(r, &units)).collect();
+        let grid = Grid::new([along, across])?;
+        let law = self.rheology.in_units(&units);
+        let acceleration = self.acceleration.map(|a| a / units.acceleration());
+        // A guess from which Newton's method starts: the pressure at rest.
+        let pressure = |height: f64| exact_pressure(height * units.length) / units.stress();
+        let flow = match self.side_walls {
+            None => Flow::at_rest(
+                grid,
+                options.threshold_pressure,
+                law,
+                acceleration,
+                options.method,
+                pressure,
+            )?,
+            Some(walls) => Flow::between_side_walls(
+                grid,
+                walls.in_units(&units),
+                law,
+                acceleration,
+                options.method,
+                pressure,
+            )?,
+        };
+        Ok(LayerRun {
+            units,
+            cells: self.cells,
+            march: March::new(&options.marching),
+            marching: options.marching,
+            flow,
+        })
+    }
+}
+
+/// A layer on its way from rest to its steady flow, step by step.
+pub struct LayerRun<L> {
+    units: Units,
+    cells: usize,
+    marching: Marching,
+    march: March,
+    flow: Flow<L>,
+}
+
+impl<L: Rheology> LayerRun<L> {
+    /// Whether the flow is steady.
+    pub fn is_over(&self) -> bool {
+        self.march.over
+    }
+
+    /// Makes one step.
+    ///
+    /// # Errors
+    /// No convergence, or no steady state within the steps that the settings allow.
+    pub fn advance(&mut self) -> Result<(), Error> {
+        self.flow.march_step(&self.marching, &mut self.march)
+    }
+
+    /// Marches until the flow is steady; `progress` sees every step and may break off.
+    pub(crate) fn march(
+        &mut self,
+        progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
+    ) -> Result<(), Error> {
+        while !self.is_over() {
+            self.advance()?;
+            let now = self.progress();
+            if progress(now).is_break() {
+                return Err(Error::Stopped { steps: now.step });
+            }
+        }
+        Ok(())
+    }
+
+    /// How far it has come.
+    pub fn progress(&self) -> Progress {
+        let units = &self.units;
+        let last = self.march.history.last();
+        let of = |read: fn(&StepRecord) -> f64| last.map_or(0.0, read);
+        Progress {
+            step: self.march.history.len(),
+            time: of(|r| r.time) * units.time(),
+            dt: of(|r| r.dt) * units.time(),
+            mean_velocity: of(|r| r.mean_velocity) * units.velocity,
+            distance_to_steady: last.map_or(f64::INFINITY, |r| r.acceleration)
+                / self.marching.steady_acceleration,
+        }
+    }
+
+    /// Velocity, pressure, stress, time and march, all in natural units: what
+    /// [`take_up`](Self::take_up) goes on from with the same bits.
+    pub fn state(&self) -> (&FlowState, f64, &March) {
+        (self.flow.state(), self.flow.time(), &self.march)
+    }
+
+    /// Goes on from a state of such a layer.
+    ///
+    /// # Errors
+    /// In words, if it is that of another grid.
+    pub fn take_up(&mut self, state: FlowState, time: f64, march: March) -> Result<(), String> {
+        self.flow.take_up(state, time)?;
+        self.march = march;
+        Ok(())
+    }
+
+    /// The flow as it is, beside the exact velocity and pressure at height z.
+    pub(crate) fn solution(
+        &self,
+        exact_velocity: impl Fn(f64) -> f64,
+        exact_pressure: impl Fn(f64) -> f64,
+    ) -> LayerSolution {
+        let (units, flow) = (self.units, &self.flow);
+        let natural = self.march.history.iter();
+        let history: Vec<StepRecord> = natural.map(|r| in_si(r, &units)).collect();
         let (mut u, mut p) = flow.profile();
         u.iter_mut().for_each(|u| *u *= units.velocity);
         p.iter_mut().for_each(|p| *p *= units.stress());
@@ -180,7 +289,7 @@ impl Layer {
         let exact_u: Vec<f64> = z.iter().map(|&z| exact_velocity(z)).collect();
         let exact_p: Vec<f64> = z.iter().map(|&z| exact_pressure(z)).collect();
         let [yielded_fraction, ill_posed_fraction] = flow.yielded_and_ill_posed();
-        Ok(LayerSolution {
+        LayerSolution {
             velocity_error_l2_relative: l2_error(&u, &exact_u),
             velocity_error_max_relative: max_error(&u, &exact_u),
             pressure_error_l2_relative: l2_error(&p, &exact_p),
@@ -188,7 +297,7 @@ impl Layer {
             boundary_shear_stress: flow.boundary_shear_stress().map(|s| s * units.stress()),
             yielded_fraction,
             ill_posed_fraction,
-            spread_along_x: spread_along_x(&flow) * units.velocity,
+            spread_along_x: spread_along_x(flow) * units.velocity,
             steps: history.len(),
             linear_solves: history.iter().map(|r| r.linear_solves).sum(),
             cells: flow.discretisation().grid().cells(),
@@ -199,7 +308,7 @@ impl Layer {
             p,
             exact_u,
             exact_p,
-        })
+        }
     }
 }
 

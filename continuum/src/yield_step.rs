@@ -11,12 +11,17 @@
 //! γ̇ of the order of ε, and nowhere is a largest viscosity imposed.
 //!
 //! Solvers stand behind [`YieldSolver`]: [`PrimalDual`] is the default, [`RegularisedViscosity`]
-//! is what is common elsewhere, for comparison.
+//! is what is common elsewhere, for comparison. With the crate's feature `conic`, `ConicProgram` solves
+//! the step without a floor, as a conic program: the reference for both on small grids.
 
 mod coefficients;
+#[cfg(feature = "conic")]
+mod conic;
 mod primal_dual;
 mod regularised;
 
+#[cfg(feature = "conic")]
+pub use conic::{ConicOptions, ConicProgram, PressureOf};
 pub use primal_dual::{PrimalDual, PrimalDualOptions};
 pub use regularised::{RegularisedOptions, RegularisedViscosity};
 

@@ -299,6 +299,10 @@ fn tiny_campaign() -> CampaignSpec {
         search_time: 20.0,
         search_inertial_number: 0.05,
         usable_drift: 10.0,
+        other_beds: Vec::new(),
+        flow_beds: 1,
+        depths: Vec::new(),
+        seed: 1,
     }
 }
 
@@ -392,7 +396,7 @@ fn the_rule_of_drifts_decides(campaign: &CampaignSpec, runs: &[InclineResult]) {
     println!("drift and its error: {reaches:.3?}");
     reaches.sort_by(f64::total_cmp);
     let half = strict(0.5 * (reaches[1] + reaches[2]));
-    let result = evaluate(&half, flows, Vec::new(), Vec::new());
+    let result = evaluate(&half, flows, Vec::new(), Vec::new(), Vec::new());
     let text = &result.verdict.text;
     assert!(text.contains("2 of 4 flows left out"), "{text}");
     let used = result.runs.iter().filter(|r| half.is_usable(r));

@@ -36,6 +36,9 @@ fn narrow(name: &str, wide: &[u64]) -> Result<Vec<u32>, String> {
 /// The real numbers called `name`, of which there must be `len`.
 fn sized<'a>(record: &'a Record, name: &str, len: usize) -> Result<&'a [f64], String> {
     let values = record.numbers(name)?;
+    if values.iter().any(|x| x.is_nan()) {
+        return Err(format!("array `{name}` holds what is not a number"));
+    }
     if values.len() == len {
         return Ok(values);
     }
@@ -177,6 +180,10 @@ impl Simulation {
         }
         grains.pad();
         let lists = sized("list/skin", 2)?;
+        let widest = f64::MAX.sqrt();
+        if !(lists[0] > 0.0 && lists[0] < widest && (0.0..widest).contains(&lists[1])) {
+            return Err("array `list/skin` does not hold two lengths".into());
+        }
         self.set_skin(lists[0]);
         self.hold = lists[1];
         let first = narrow("list/first", record.counts("list/first")?)?;

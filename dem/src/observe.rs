@@ -86,14 +86,21 @@ impl Simulation {
             if distance >= radii && !self.holds(&self.history_of(chunk, k)) {
                 continue;
             }
+            let slot = &chunk.slots[k * rows..][..rows];
+            let (turn, moment) = (
+                vector(&slot[1]),
+                slot.get(2).map_or_else(Vector3::zeros, vector),
+            );
             // The contact point divides the line of centres as the radii do.
             into.contacts.push(ContactSample {
                 grain: i,
                 partner: Partner::Grain(j),
                 overlap: radii - distance,
-                force: vector(&chunk.slots[k * rows]),
+                force: vector(&slot[0]),
                 arm: -apart * (a[3] / radii),
                 partner_arm: apart * (b[3] / radii),
+                torque: turn * a[3] + moment,
+                partner_torque: turn * b[3] - moment,
             });
         }
         for contact in self.wall_contacts.touching() {
@@ -109,6 +116,9 @@ impl Simulation {
                 force: vector(&contact.slot[0]),
                 arm: -Vector3::from(contact.normal) * distance,
                 partner_arm: Vector3::zeros(),
+                torque: vector(&contact.slot[1]) * self.grains.place[i][3]
+                    + vector(&contact.slot[2]),
+                partner_torque: Vector3::zeros(),
             });
         }
         self.bond_samples(&mut into.bonds);

@@ -349,6 +349,9 @@ impl Setup {
     }
 }
 
+/// Beyond this a position counts as lost (m), and a square overflows.
+pub(crate) const FARTHEST: f64 = 1e150;
+
 /// Checks grains; their largest radius.
 pub(crate) fn check_grains(grains: &[Grain], materials: usize) -> Result<f64, SetupError> {
     let mut largest: f64 = 0.0;
@@ -368,7 +371,10 @@ pub(crate) fn check_grains(grains: &[Grain], materials: usize) -> Result<f64, Se
             ("spin", &g.spin),
         ] {
             for c in v.iter() {
-                check(&format!("grains[{k}].{name}"), *c, "finite", |_| true)?;
+                // What a run would call lost.
+                check(&format!("grains[{k}].{name}"), *c, "below 1e150", |v| {
+                    v.abs() < FARTHEST
+                })?;
             }
         }
         known_material(g.material, materials)?;

@@ -53,6 +53,10 @@ pub struct ContactSample {
     ///
     /// `arm - partner_arm` is the branch vector from `grain` to `partner`, nearest image.
     pub partner_arm: Vector3<f64>,
+    /// Torque on `grain` about its centre (N m): that of the force, and moments of rolling and twisting.
+    pub torque: Vector3<f64>,
+    /// Torque on `partner` about its centre (N m); zero for a wall.
+    pub partner_torque: Vector3<f64>,
 }
 
 /// A whole bond at one instant; it acts beside the contact of its grains, if they touch.
@@ -75,8 +79,9 @@ pub struct BondSample {
 }
 
 impl BondSample {
-    /// The bond as if it were a contact: force and arms alone, without its moments.
+    /// The bond as if it were a contact; what its force and moments do about any point cancels in the pair.
     pub fn as_contact(&self) -> ContactSample {
+        let branch = self.arm - self.partner_arm;
         ContactSample {
             grain: self.grains[0],
             partner: Partner::Grain(self.grains[1]),
@@ -84,6 +89,8 @@ impl BondSample {
             force: self.force,
             arm: self.arm,
             partner_arm: self.partner_arm,
+            torque: self.moment,
+            partner_torque: branch.cross(&self.force) - self.moment,
         }
     }
 }

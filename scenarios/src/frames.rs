@@ -6,7 +6,7 @@
 
 use crate::failure::Failure;
 use crate::vtkhdf::{self, Cells, Field, Frame, Values};
-use colluvium_dem::{Clusters, GrainSample, Partner, Simulation, Snapshot};
+use colluvium_dem::{Clusters, ContactSample, GrainSample, Partner, Simulation, Snapshot};
 use nalgebra::Vector3;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -83,7 +83,8 @@ impl Frames {
         self.directory.join(FOLDER).join(name)
     }
 
-    /// Joins all frames up to the last step `done` into one file a series and removes the single ones.
+    /// Joins all frames up to the last step `done` into one file a series. The single ones stay until the run
+    /// is done: one that is killed in between joins them again.
     pub fn join(&self, done: u64) -> Result<(), Failure> {
         if self.count == 0 {
             return Ok(());
@@ -96,10 +97,7 @@ impl Frames {
             let series = self.directory.join(format!("{series}.vtkhdf"));
             vtkhdf::write(&series, paths.map(|path| vtkhdf::read_frame(&path)))?;
         }
-        remove(&self.directory).map_err(|error| {
-            let folder = self.directory.join(FOLDER);
-            Failure::Run(format!("cannot remove {}: {error}", folder.display()))
-        })
+        Ok(())
     }
 }
 
@@ -208,9 +206,7 @@ enum Kind {
 
 /// One contact or bond: its line, and what acts along it.
 struct Link {
-    ends: [Vector3<f64>; 2],
-    force: Vector3<f64>,
-    overlap: f64,
+    contact: ContactSample,
     kind: Kind,
     stress: [f64; 2],
 }
@@ -218,14 +214,9 @@ struct Link {
 /// Contacts and bonds as lines from centre to centre, to the contact point at walls; a line across a
 /// periodic boundary leaves the box at its second end.
 pub fn contacts(snapshot: &Snapshot) -> Frame {
-    let at = |grain: usize| snapshot.grains[grain].position;
+    let grains = &snapshot.grains;
     let touching = snapshot.contacts.iter().map(|contact| Link {
-        ends: [
-            at(contact.grain),
-            at(contact.grain) + contact.arm - contact.partner_arm,
-        ],
-        force: contact.force,
-        overlap: contact.overlap,
+        contact: *contact,
         kind: match contact.partner {
             Partner::Grain(_) => Kind::Pair,
             Partner::Wall(_) | Partner::Body(_) => Kind::Wall,
@@ -233,15 +224,18 @@ pub fn contacts(snapshot: &Snapshot) -> Frame {
         stress: [0.0; 2],
     });
     let bonded = snapshot.bonds.iter().map(|bond| Link {
-        ends: [
-            at(bond.grains[0]),
-            at(bond.grains[0]) + bond.arm - bond.partner_arm,
-        ],
-        force: bond.force,
-        overlap: 0.0,
+        contact: bond.as_contact(),
         kind: Kind::Bond,
         stress: [bond.stress.tensile, bond.stress.shear],
     });
+    let ends = |c: &ContactSample| {
+        let at = grains[c.grain].position;
+        [at, at + c.arm - c.partner_arm]
+    };
+    let other = |c: &ContactSample| match c.partner {
+        Partner::Grain(j) => i64::from(grains[j].id),
+        Partner::Wall(_) => -1,
+    };
     let links: Vec<Link> = touching.chain(bonded).collect();
     let scalars = |read: fn(&Link) -> f64| Values::Scalars(links.iter().map(read).collect());
     Frame {
@@ -249,12 +243,42 @@ pub fn contacts(snapshot: &Snapshot) -> Frame {
         cells: Cells::Lines,
         points: links
             .iter()
-            .flat_map(|link| link.ends)
+            .flat_map(|link| ends(&link.contact))
             .map(Into::into)
             .collect(),
         fields: vec![
-            field("force", "N", vectors(links.iter().map(|link| link.force))),
-            field("overlap", "m", scalars(|link| link.overlap)),
+            field(
+                "force",
+                "N",
+                vectors(links.iter().map(|link| link.contact.force)),
+            ),
+            field("overlap", "m", scalars(|link| link.contact.overlap)),
+            field(
+                "first",
+                "id of the grain the force acts on",
+                Values::Counts(
+                    links
+                        .iter()
+                        .map(|l| i64::from(grains[l.contact.grain].id))
+                        .collect(),
+                ),
+            ),
+            field(
+                "second",
+                "id of the other grain, -1 for a wall",
+                Values::Counts(links.iter().map(|l| other(&l.contact)).collect()),
+            ),
+            field("arm", "m", vectors(links.iter().map(|l| l.contact.arm))),
+            field(
+                "torque",
+                "N m",
+                vectors(links.iter().map(|l| l.contact.torque)),
+            ),
+            field(
+                "other_torque",
+                "N m",
+                vectors(links.iter().map(|l| l.contact.partner_torque)),
+            ),
             field(
                 "kind",
                 "0 pair of grains, 1 wall, 2 bond",

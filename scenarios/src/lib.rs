@@ -8,10 +8,12 @@
 
 pub mod calibrate;
 pub mod checkpoint;
+pub mod coarse_grain;
 pub mod command_line;
 pub mod cost;
 pub mod failure;
 pub mod frames;
+pub mod grain_files;
 pub mod interruption;
 pub mod journal;
 pub mod mesh_files;
@@ -24,8 +26,10 @@ pub mod rheology_file;
 pub mod run;
 pub mod run_directory;
 pub mod scene;
+pub mod seal;
 pub mod start_file;
 pub mod state_hash;
 pub mod summary;
 pub mod table;
+pub mod validate;
 pub mod vtkhdf;

@@ -119,10 +119,7 @@ impl Comparison {
                 },
                 other => other,
             };
-            match directory.mark_ended(&failure, start.elapsed().as_secs_f64()) {
-                Ok(()) => failure,
-                Err(unwritten) => unwritten,
-            }
+            directory.mark_ended(failure, start.elapsed().as_secs_f64())
         })
     }
 
@@ -181,7 +178,7 @@ impl Comparison {
                 &RunOptions {
                     out,
                     threads,
-                    resume: false,
+                    ..RunOptions::default()
                 },
             )
             .map(|ended| ended.directory)

@@ -11,7 +11,7 @@ use std::path::Path;
 pub fn write(path: &Path, scene: &str, tables: &[&Table]) -> Result<(), Failure> {
     let partial = path.with_extension("h5.partial");
     let done = write_tables(&partial, scene, tables)
-        .map_err(|error| error.to_string())
+        .map_err(|error| reason(&error))
         .and_then(|()| put_in_place(&partial, path).map_err(|error| error.to_string()));
     done.map_err(|error| {
         let _ = std::fs::remove_file(&partial);
@@ -65,8 +65,25 @@ pub fn read_attribute(at: &hdf5::Location, name: &str) -> hdf5::Result<String> {
         .to_owned())
 }
 
-/// Flushes a finished file to the disk and gives it its name.
+/// What went wrong with a file, in one line: the system's reason where HDF5 passes one on.
+pub fn reason(error: &hdf5::Error) -> String {
+    let text = error.to_string();
+    let system = text
+        .split_once("error message = '")
+        .and_then(|(_, rest)| rest.split_once('\''));
+    match system {
+        Some((reason, _)) => reason.to_owned(),
+        None => text.lines().next().unwrap_or_default().to_owned(),
+    }
+}
+
+/// Flushes a finished file to the disk and gives it its name, for good: the folder is flushed too.
 pub fn put_in_place(partial: &Path, path: &Path) -> std::io::Result<()> {
     std::fs::File::open(partial)?.sync_all()?;
-    std::fs::rename(partial, path)
+    std::fs::rename(partial, path)?;
+    let folder = path.parent().filter(|f| !f.as_os_str().is_empty());
+    let folder = std::fs::File::open(folder.unwrap_or(Path::new(".")))?;
+    // Not every file system can flush a folder.
+    let _ = folder.sync_all();
+    Ok(())
 }

@@ -9,13 +9,15 @@ mod grains;
 pub mod impact;
 pub mod impact_scales;
 pub mod incline;
+mod march_record;
 pub mod precheck;
 pub mod settle;
 pub mod step;
 pub mod world;
 
-use crate::checkpoint::{self, Checkpoint};
+use crate::checkpoint::{Checkpoint, Checkpoints};
 use crate::failure::{Failure, Resumes};
+use crate::frames;
 use crate::report;
 use crate::results_file;
 use crate::run_directory::{self, RunDirectory};
@@ -35,10 +37,15 @@ pub struct RunOptions {
     pub threads: Option<usize>,
     /// Goes on from the checkpoint in the directory.
     pub resume: bool,
+    /// Wall time between two checkpoints; none for [`CHECKPOINT_EVERY`].
+    pub checkpoint_every: Option<Duration>,
 }
 
-/// Wall time between two checkpoints.
-const CHECKPOINT_EVERY: Duration = Duration::from_secs(20);
+/// Wall time between two checkpoints, where nobody says another one.
+pub const CHECKPOINT_EVERY: Duration = Duration::from_secs(20);
+/// Times the wall time of writing a checkpoint that pass before the next one: writing takes at most a
+/// twentieth of a run.
+const WRITES_APART: u32 = 19;
 
 /// What a finished run hands over.
 #[derive(Debug)]
@@ -75,7 +82,11 @@ pub struct Under<'a> {
     pub threads: usize,
     start: Instant,
     wall_before: f64,
+    checkpoints: Checkpoints,
     last_checkpoint: Instant,
+    /// Wall time from one checkpoint to the next.
+    pause: Duration,
+    given_pause: Option<Duration>,
     /// Whether the state is there and work may begin: until then a resumed run writes nothing.
     begun: bool,
 }
@@ -114,17 +125,20 @@ impl Under<'_> {
         record: impl FnOnce() -> Record,
     ) -> Result<(), Failure> {
         let stop = crate::interruption::requested();
-        if !stop && self.last_checkpoint.elapsed() < CHECKPOINT_EVERY {
+        if !stop && self.last_checkpoint.elapsed() < self.pause {
             return Ok(());
         }
+        let begin = Instant::now();
         let checkpoint = Checkpoint {
             record: record(),
             stage: stage.to_owned(),
             wall_s: self.wall_s(),
         };
-        let path = self.directory.file(run_directory::CHECKPOINT);
-        checkpoint::write(&path, &self.scene.name, &checkpoint)?;
+        self.checkpoints.write(&self.scene.name, &checkpoint)?;
         self.last_checkpoint = Instant::now();
+        self.pause = self
+            .given_pause
+            .unwrap_or_else(|| CHECKPOINT_EVERY.max(WRITES_APART * begin.elapsed()));
         self.directory
             .journal
             .note(&format!("checkpoint ({stage})"));
@@ -139,7 +153,7 @@ impl Under<'_> {
     pub fn interrupted(&self) -> Failure {
         Failure::Interrupted {
             directory: self.directory.path().to_owned(),
-            resumes: Resumes::from_saved(self.directory.file(run_directory::CHECKPOINT).exists()),
+            resumes: Resumes::from_saved(self.checkpoints.exist()),
         }
     }
 }
@@ -168,14 +182,28 @@ pub fn open_directory(
     }
 }
 
-/// What stands in a directory that is already done.
-pub fn already_done(directory: &RunDirectory) -> Ended {
+/// What stands in a directory that is already done. A run that was killed after that was said, but
+/// before its report was written and its checkpoints removed, is tidied up.
+pub fn already_done(directory: &RunDirectory) -> Result<Ended, Failure> {
     directory.journal.note("already done: nothing to resume");
-    Ended {
+    if !directory.file(run_directory::REPORT).exists() {
+        report::write(directory.path())?;
+    }
+    tidy(directory)?;
+    Ok(Ended {
         directory: directory.path().to_owned(),
         already_done: true,
         warnings: Vec::new(),
-    }
+    })
+}
+
+/// Removes what only a run under way needs.
+fn tidy(directory: &RunDirectory) -> Result<(), Failure> {
+    Checkpoints::of(directory.path()).remove()?;
+    frames::remove(directory.path()).map_err(|error| {
+        let folder = directory.file(frames::FOLDER);
+        Failure::Run(format!("cannot remove {}: {error}", folder.display()))
+    })
 }
 
 /// Threads that compute.
@@ -205,13 +233,18 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> {
     let threads = options.threads.unwrap_or_else(rayon::current_num_threads);
     let (directory, before) = open_directory(scene, options, "run")?;
     if before.is_some_and(|s| s.status == Status::Done) {
-        return Ok(already_done(&directory));
+        return already_done(&directory);
     }
-    let mut resumed = None;
-    let path = directory.file(run_directory::CHECKPOINT);
+    let mut checkpoints = Checkpoints::of(directory.path());
     // A run that was stopped before its first checkpoint starts again.
-    if options.resume && path.exists() {
-        resumed = Some(checkpoint::read(&path, &scene.name)?);
+    let found = match options.resume {
+        true => checkpoints.read(&scene.name)?,
+        false => None,
+    };
+    let (resumed, warning) = found.map_or((None, None), |(c, warning)| (Some(c), warning));
+    let warnings = Vec::from_iter(warning);
+    for warning in &warnings {
+        directory.journal.note(warning);
     }
     directory
         .journal
@@ -224,7 +257,10 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> {
         threads,
         start: Instant::now(),
         wall_before,
+        checkpoints,
         last_checkpoint: Instant::now(),
+        pause: options.checkpoint_every.unwrap_or(CHECKPOINT_EVERY),
+        given_pause: options.checkpoint_every,
         begun: false,
     };
     let found = pool(threads).and_then(|pool| {
@@ -242,7 +278,7 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> {
         Ok(()) => Ok(Ended {
             directory: directory.path().to_owned(),
             already_done: false,
-            warnings: Vec::new(),
+            warnings,
         }),
         Err(failure @ (Failure::Scene(_) | Failure::Input(_))) if !begun => {
             directory.abandon();
@@ -252,8 +288,7 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> {
         Err(failure) if !begun && going_on => Err(failure),
         Err(failure) => {
             let failure = failure.after_work();
-            directory.mark_ended(&failure, wall_s)?;
-            Err(failure)
+            Err(directory.mark_ended(failure, wall_s))
         }
     }
 }
@@ -273,11 +308,7 @@ pub fn finish(scene: &Scene, directory: &RunDirectory, findings: Findings) -> Re
     summary.status = Status::Done;
     directory.write_summary(&summary)?;
     report::write(directory.path())?;
-    let left = directory.file(run_directory::CHECKPOINT);
-    if left.exists() {
-        std::fs::remove_file(&left)
-            .map_err(|error| Failure::Run(format!("cannot remove {}: {error}", left.display())))?;
-    }
+    tidy(directory)?;
     directory.journal.note("done");
     Ok(())
 }

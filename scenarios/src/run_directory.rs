@@ -3,6 +3,7 @@
 use crate::failure::Failure;
 use crate::journal::Journal;
 use crate::report;
+use crate::results_file::put_in_place;
 use crate::scene::Scene;
 use crate::summary::{Status, Summary};
 use crate::table::Table;
@@ -18,19 +19,22 @@ pub const SUMMARY: &str = "summary.json";
 pub const REPORT: &str = "report.html";
 /// Name of the results.
 pub const RESULTS: &str = "results.h5";
-/// Name of the checkpoint.
+/// Name of the last checkpoint.
 pub const CHECKPOINT: &str = "checkpoint.h5";
+/// Name of the one before.
+pub const CHECKPOINT_BEFORE: &str = "checkpoint_before.h5";
 /// Name of the packing that a run starts from.
 pub const PACKING: &str = "packing.h5";
 /// Name of the log.
 pub const LOG: &str = "log.txt";
 
 /// Every file that a run, a campaign or a comparison writes.
-const OWN_FILES: [&str; 21] = [
+const OWN_FILES: [&str; 25] = [
     SCENE,
     REPORT,
     RESULTS,
     CHECKPOINT,
+    CHECKPOINT_BEFORE,
     PACKING,
     LOG,
     "grains.vtkhdf",
@@ -39,6 +43,9 @@ const OWN_FILES: [&str; 21] = [
     "energy.csv",
     "trajectory.csv",
     "history.csv",
+    "avalanches.csv",
+    "ball.csv",
+    "rates.csv",
     "points.csv",
     "stress.csv",
     "angles.csv",
@@ -139,6 +146,13 @@ impl RunDirectory {
                 summary.command
             )));
         }
+        let begun = [SCENE, CHECKPOINT, CHECKPOINT_BEFORE]
+            .iter()
+            .any(|name| path.join(name).exists());
+        if summary.status == Status::Running && !begun {
+            // Killed while its folder was made: there is nothing to go on from.
+            return Ok((RunDirectory::create(path, scene, command)?, summary));
+        }
         let text = fs::read_to_string(path.join(SCENE)).map_err(|error| {
             Failure::Input(format!(
                 "--resume: {shown} holds no run to go on with: {SCENE}: {error}; allowed: --out with the directory of an interrupted run"
@@ -204,18 +218,24 @@ impl RunDirectory {
         self.write_summary(&Summary::begun(&self.scene, self.command))
     }
 
-    /// Says in summary and log how the work ended when it did not end well. What it has written
-    /// stays, and so does what it cost so far.
-    pub fn mark_ended(&self, failure: &Failure, wall_s: f64) -> Result<(), Failure> {
+    /// Says in summary and log how the work ended when it did not end well, and gives that back. What
+    /// it has written stays, and so does what it cost so far.
+    ///
+    /// Where the summary cannot be written either, as on a full disk, it still says that the run is
+    /// under way; that can be gone on with, too.
+    pub fn mark_ended(&self, failure: Failure, wall_s: f64) -> Failure {
         let mut summary = Summary::begun(&self.scene, self.command);
-        summary.status = match failure {
+        summary.status = match &failure {
             Failure::Interrupted { .. } => Status::Interrupted,
             _ => Status::Failed,
         };
         summary.cost.wall_s = wall_s;
         summary.remarks.push(failure.to_string());
         self.journal.note(&failure.to_string());
-        self.write_summary(&summary)
+        match (self.write_summary(&summary), failure) {
+            (Err(also), Failure::Run(message)) => Failure::Run(format!("{message}; {also}")),
+            (_, failure) => failure,
+        }
     }
 }
 
@@ -230,11 +250,8 @@ pub fn write_in_place(path: &Path, content: &[u8]) -> std::io::Result<()> {
     let mut name = path.file_name().unwrap_or_default().to_owned();
     name.push(".partial");
     let partial = path.with_file_name(name);
-    let written = fs::File::create(&partial).and_then(|mut file| {
-        file.write_all(content)?;
-        file.sync_all()
-    });
-    match written.and_then(|()| fs::rename(&partial, path)) {
+    let written = fs::File::create(&partial).and_then(|mut file| file.write_all(content));
+    match written.and_then(|()| put_in_place(&partial, path)) {
         Ok(()) => Ok(()),
         Err(error) => {
             let _ = fs::remove_file(&partial);
@@ -250,7 +267,10 @@ fn refuse_foreign(path: &Path) -> Result<(), Failure> {
             "--out {shown}: is a file; allowed: a new, an empty or an earlier run's directory"
         )));
     }
-    let occupied = fs::read_dir(path).is_ok_and(|mut entries| entries.next().is_some());
+    // What is left of a run that was killed while it wrote its very first file is nobody's.
+    let first = format!("{SUMMARY}.partial");
+    let occupied = fs::read_dir(path)
+        .is_ok_and(|entries| entries.flatten().any(|entry| entry.file_name() != *first));
     if occupied && !is_run(path) {
         return Err(Failure::Input(format!(
             "--out {shown}: is not empty and not a run directory; allowed: a new, an empty or an earlier run's directory"

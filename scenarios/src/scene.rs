@@ -9,17 +9,19 @@ mod bed;
 mod check;
 mod chute;
 mod error;
+mod friction_keys;
 mod grains;
 mod impact;
 mod incline;
 mod kinds;
 mod law;
 mod law_layers;
+mod layer_case;
 pub mod layers;
 mod settle;
 pub mod world;
 
-pub use bagnold::{BagnoldGrid, BagnoldScene, RheologyKeys, SolverKeys, SolverMethod};
+pub use bagnold::{BagnoldGrid, BagnoldScene, FrictionLaw, RheologyKeys, SolverKeys, SolverMethod};
 pub use bed::Pace;
 pub use chute::ChuteScene;
 pub use error::SceneError;
@@ -33,6 +35,7 @@ pub use kinds::Kind;
 pub use law::{
     CohesionKind, LawKeys, LeverKind, MemoryKind, NormalKind, Parts, RollingKind, TangentialKind,
 };
+pub use layer_case::{LayerCase, LayerVisitor};
 pub use settle::{SettleFloor, SettleGrains, SettleScene};
 
 use crate::rheology_file;
@@ -201,9 +204,12 @@ impl Scene {
                 kinds::anchor(&mut own, folder);
             }
         }
+        // What was written, before a file's numbers take their places.
+        let written = own.clone();
         let mut inputs = Vec::new();
         inputs.extend(rheology_file::resolve(&mut own)?);
         let mut set = layers::parse_settings(settings, option)?;
+        let set_by_hand = set.clone();
         check::check(&set, &schema, option)?;
         layers::check_choices(&set, choices, option)?;
         inputs.extend(rheology_file::resolve(&mut set)?);
@@ -227,6 +233,15 @@ impl Scene {
             }
             law_layers::check_read(&table, &set, (impact, true), option)?;
             law_layers::drop_unread(&mut table, impact);
+        }
+        if matches!(kind, Family::Bagnold) {
+            // A bundled scene has the numbers of all laws, as defaults.
+            if folder.is_some() && !friction_keys::chooses(&set) {
+                friction_keys::check_read(&table, &written, origin)?;
+            }
+            friction_keys::check_read(&table, &set_by_hand, option)?;
+            friction_keys::drop_unread(&mut table);
+            friction_keys::check_complete(&table, origin)?;
         }
         check::check(&table, &schema, origin)?;
         check::require(&table, &schema, origin)?;

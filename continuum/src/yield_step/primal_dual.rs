@@ -342,7 +342,7 @@ fn evaluate<R: Rheology>(
     let gamma = point.strain_rate(u);
     let rate = (gamma[0] * gamma[0] + gamma[1] * gamma[1] + floor * floor).sqrt();
     let (pressure, depends) = threshold_pressure(point.pressure(p));
-    let mut threshold = rheology.threshold(rate, pressure);
+    let mut threshold = point.law.threshold(rheology, rate, pressure);
     if !depends {
         threshold.by_pressure = 0.0;
     }
@@ -373,7 +373,7 @@ fn functional<R: Rheology>(
             let gamma = point.strain_rate(u);
             let rate = (gamma[0] * gamma[0] + gamma[1] * gamma[1] + floor * floor).sqrt();
             let (pressure, _) = threshold_pressure(point.pressure(p));
-            point.weight * problem.rheology.potential(rate, pressure)
+            point.weight * point.law.potential(problem.rheology, rate, pressure)
         })
         .sum();
     kinetic + dissipated

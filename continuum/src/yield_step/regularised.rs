@@ -89,7 +89,7 @@ impl RegularisedViscosity {
         for (point, viscosity) in points.iter().zip(&mut self.viscosity) {
             let rate = strain_rate_norm(point.strain_rate(&self.trial.u));
             let (pressure, _) = threshold_pressure(point.pressure(&self.trial.p));
-            let stress = problem.rheology.threshold(rate, pressure).stress;
+            let stress = point.law.threshold(problem.rheology, rate, pressure).stress;
             // The comparison form of the minimum has no division by a strain rate of zero.
             *viscosity = if stress < self.options.largest_viscosity * rate {
                 stress / rate

@@ -2,7 +2,7 @@
 
 use super::Simulation;
 use crate::grains::vector;
-use crate::setup::SetupError;
+use crate::setup::{FARTHEST, SetupError};
 use crate::timestep::{self, Body, Classes, Conditions, Remedy, Shares};
 
 /// The step no longer follows the motion.
@@ -121,7 +121,7 @@ impl Simulation {
             });
         }
         let n = self.grains.len();
-        let lost = |x: &[f64; 4]| !x.iter().all(|c| c.abs() < 1e150);
+        let lost = |x: &[f64; 4]| !x.iter().all(|c| c.abs() < FARTHEST);
         match self.grains.place[..n].iter().position(lost) {
             None => Ok(()),
             Some(i) => Err(Diverged::Escape {

@@ -175,7 +175,7 @@ fn wall_in_words(wall: &Wall) -> String {
         ),
         Shape::Cuboid(c) => {
             let [x, y, z] = (2.0 * c.half_sides).into();
-            format!("cuboid of {x} m × {y} m × {z} m")
+            format!("block of {x} m x {y} m x {z} m")
         }
         Shape::SphereShell(s) => format!("sphere of radius {} m", s.radius),
         Shape::Mesh(mesh) => format!("mesh of {} triangles", mesh.triangles().len()),

@@ -104,9 +104,22 @@ pub fn check(scene: &Scene, bed: Bed, timestep_key: f64) -> Result<(), Failure> 
         let path = scene.body.start_file().unwrap_or_default();
         return Err(refused_start(path, "all grains are frozen".into()).into());
     }
-    let refused = |error: SetupError| match scene.body.start_file() {
-        Some(path) => refused_start(path, error.to_string()).into(),
-        None => Failure::Input(format!("{}: {error}", scene.origin)),
+    let refused = |error: SetupError| match (error, scene.body.start_file()) {
+        // Only the chute is periodic.
+        (
+            SetupError::NarrowDomain {
+                axis,
+                length,
+                least,
+            },
+            _,
+        ) => {
+            let key = if axis == 'x' { "length" } else { "width" };
+            let range = format!("at least {least}: two largest diameters and the list's skin");
+            scene.out_of_range(key, length, &range).into()
+        }
+        (error, Some(path)) => refused_start(path, error.to_string()).into(),
+        (error, None) => Failure::Input(format!("{}: {error}", scene.origin)),
     };
     let choice = bed.allowed_step().map_err(refused)?;
     let step = bed.pace.timestep;

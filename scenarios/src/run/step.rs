@@ -60,12 +60,17 @@ pub fn check(
         return Ok(());
     };
     let of_key = |seconds: f64| shortened(seconds * value / step);
+    let does = of_key(choice.allowed());
+    let does = if does.is_normal() {
+        format!("{does:?} would do")
+    } else {
+        "no step that a computer can hold would do".into()
+    };
     let range = format!(
-        "(0, {:?}): from there on one contact is unstable ({}, {}); {:?} would do",
+        "(0, {:?}): from there on one contact is unstable ({}, {}); {does}",
         of_key(limit.seconds),
         limit.name,
         limit.pair,
-        of_key(choice.allowed())
     );
     Err(scene.out_of_range(key, value, &range))
 }

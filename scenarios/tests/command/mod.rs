@@ -33,6 +33,13 @@ pub fn summary(directory: &Path) -> Value {
     serde_json::from_str(&text).unwrap()
 }
 
+/// The hash of the final state of a finished run.
+pub fn hash(directory: &Path) -> String {
+    let summary = summary(directory);
+    assert_eq!(summary["status"], "done");
+    summary["state_hash"].as_str().unwrap().to_owned()
+}
+
 /// The value of a result.
 pub fn value(summary: &Value, name: &str) -> f64 {
     summary["results"][name]["value"]

@@ -1,7 +1,8 @@
 //! Packings in files: places, velocities, materials and contacts, with what they were made by.
 
 use crate::failure::Failure;
-use crate::results_file::{attribute, put_in_place, read_attribute};
+use crate::results_file::{attribute, put_in_place, read_attribute, reason};
+use crate::seal;
 use crate::summary::Note;
 use colluvium_dem::preparation::Packing;
 use colluvium_dem::{Domain, Grain};
@@ -54,7 +55,8 @@ fn column(grain: &Grain, k: usize) -> f64 {
 pub fn write(path: &Path, scene: &str, stored: &Stored) -> Result<(), Failure> {
     let partial = path.with_extension("h5.partial");
     let done = write_arrays(&partial, scene, stored)
-        .map_err(|error| error.to_string())
+        .map_err(|error| reason(&error))
+        .and_then(|()| seal::close(&partial).map_err(|error| error.to_string()))
         .and_then(|()| put_in_place(&partial, path).map_err(|error| error.to_string()));
     done.map_err(|error| {
         let _ = std::fs::remove_file(&partial);
@@ -118,18 +120,15 @@ pub fn read(path: &Path) -> Result<Stored, String> {
     if !path.exists() {
         return Err("there is no such file".into());
     }
-    let first = |error: hdf5::Error| {
-        let text = error.to_string();
-        text.lines().next().unwrap_or_default().to_owned()
-    };
+    seal::check(path)?;
     let file = hdf5::File::open(path)
-        .map_err(|error| format!("not a whole HDF5 file ({})", first(error)))?;
+        .map_err(|error| format!("not a whole HDF5 file ({})", reason(&error)))?;
     match read_attribute(&file, "format") {
         Ok(format) if format == FORMAT => {}
         Ok(format) => return Err(format!("not a packing of this program (format `{format}`)")),
         Err(_) => return Err("not a packing of this program (no format)".into()),
     }
-    let stored = read_arrays(&file).map_err(|error| format!("damaged ({})", first(error)))?;
+    let stored = read_arrays(&file).map_err(|error| format!("damaged ({})", reason(&error)))?;
     check(&stored)?;
     Ok(stored)
 }
@@ -243,7 +242,11 @@ mod tests {
 
         let bytes = std::fs::read(&path).unwrap();
         std::fs::write(&path, &bytes[..bytes.len() / 2]).unwrap();
-        assert!(read(&path).unwrap_err().contains("HDF5"));
+        assert!(read(&path).unwrap_err().contains("damaged"));
+        let mut flipped = bytes.clone();
+        flipped[bytes.len() / 3] ^= 4;
+        std::fs::write(&path, &flipped).unwrap();
+        assert!(read(&path).unwrap_err().contains("damaged"));
         let mut strange = example();
         strange.packing.grains[0].radius = f64::NAN;
         write(&path, "grains", &strange).unwrap();

@@ -1,0 +1,266 @@
+//! Runs that are killed or stopped at any moment go on to the same state.
+
+#![allow(clippy::unwrap_used)] // a test may panic
+
+mod command;
+
+use command::{colluvium, hash, succeed};
+use rand::{RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use std::path::Path;
+use std::process::{Child, Command, Stdio};
+use std::time::{Duration, Instant};
+
+/// Longest wait for anything.
+const PATIENCE: Duration = Duration::from_secs(120);
+
+fn start(folder: &Path, arguments: &[&str]) -> Child {
+    Command::new(env!("CARGO_BIN_EXE_colluvium"))
+        .args(arguments)
+        .current_dir(folder)
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap()
+}
+
+/// Starts a run and kills it as soon as `now` says so; false where it was done before that.
+fn kill(folder: &Path, arguments: &[&str], mut now: impl FnMut() -> bool) -> bool {
+    let mut child = start(folder, arguments);
+    let begin = Instant::now();
+    while !now() && begin.elapsed() < PATIENCE {
+        if let Some(status) = child.try_wait().unwrap() {
+            assert!(status.success(), "{arguments:?} failed by itself");
+            return false;
+        }
+    }
+    child.kill().unwrap();
+    child.wait().unwrap().code().is_none()
+}
+
+/// Points and times of all frames of a series.
+fn frames(path: &Path) -> Vec<u64> {
+    let root = hdf5::File::open(path).unwrap().group("VTKHDF").unwrap();
+    ["Points", "Steps/Values"]
+        .iter()
+        .flat_map(|name| root.dataset(name).unwrap().read_raw::<f64>().unwrap())
+        .map(f64::to_bits)
+        .collect()
+}
+
+/// Whether a folder holds a file that is just being written.
+fn unfinished(folder: &Path) -> bool {
+    std::fs::read_dir(folder).is_ok_and(|entries| {
+        entries.flatten().any(|entry| {
+            let name = entry.file_name().into_string().unwrap_or_default();
+            name.ends_with("h5.partial") || name.ends_with("vtkhdf.partial")
+        })
+    })
+}
+
+/// Runs a scene whole, and in parts that are killed at random moments, in the middle of a checkpoint
+/// and in the middle of a frame; both must end in the same state, rows and frames.
+fn killed_and_whole(scene: &str, sets: &[&str], seed: u64, random_kills: u32) {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = |out: &'static str, more: &[&'static str]| {
+        let mut list = vec!["run", scene, "--out", out, "--checkpoint-every", "0"];
+        for set in sets {
+            list.extend(["--set", set]);
+        }
+        list.extend(more);
+        list
+    };
+    let begin = Instant::now();
+    succeed(folder.path(), &arguments("whole", &[]));
+    let duration = begin.elapsed();
+    let [whole, parts] = ["whole", "parts"].map(|name| folder.path().join(name));
+
+    let mut random = ChaCha8Rng::seed_from_u64(seed);
+    let resume = |now: &mut dyn FnMut() -> bool| {
+        // Before its first file stands a run is begun, not resumed.
+        let begun = parts.join("summary.json").exists();
+        let more: &[&str] = if begun { &["--resume"] } else { &[] };
+        kill(folder.path(), &arguments("parts", more), now)
+    };
+    let mut kills = 0;
+    // In the middle of writing a checkpoint, and, where there are any, a frame.
+    let mut cut = [0; 2];
+    for (k, place) in [parts.clone(), parts.join("frames")].iter().enumerate() {
+        for _ in 0..6 {
+            if cut[k] < 2 && resume(&mut || unfinished(place)) {
+                kills += 1;
+                cut[k] += u32::from(unfinished(place));
+            }
+        }
+    }
+    for _ in 0..random_kills {
+        let wait = duration.mul_f64(random.random_range(0.0..0.3));
+        let begin = Instant::now();
+        kills += u32::from(resume(&mut || begin.elapsed() > wait));
+    }
+    println!("{scene}: {duration:.1?} whole, {kills} kills, {cut:?} in checkpoints and frames");
+    assert!(kills > 0 && cut[0] > 0, "{kills} {cut:?}");
+    let last = colluvium(folder.path(), &arguments("parts", &["--resume"]));
+    assert!(last.status.success(), "{last:?}");
+    assert_eq!(hash(&parts), hash(&whole));
+    let energy = |d: &Path| std::fs::read(d.join("energy.csv")).unwrap();
+    assert_eq!(energy(&parts), energy(&whole));
+    for name in ["grains.vtkhdf", "contacts.vtkhdf"] {
+        if whole.join(name).exists() {
+            assert_eq!(frames(&parts.join(name)), frames(&whole.join(name)));
+        }
+    }
+    let listing = |d: &Path| {
+        let entries = std::fs::read_dir(d).unwrap().flatten();
+        let mut names: Vec<_> = entries.map(|e| e.file_name()).collect();
+        names.sort();
+        names
+    };
+    assert_eq!(
+        listing(&parts),
+        listing(&whole),
+        "something was left behind"
+    );
+}
+
+#[test]
+fn a_killed_bed_goes_on_with_rows_and_frames() {
+    let sets = ["scale=0.5", "steps=1000", "frames=5"];
+    killed_and_whole("settle", &sets, 5, 4);
+}
+
+#[test]
+fn a_killed_chute_goes_on_with_rows_and_frames() {
+    let sets = ["steps=200", "record_every=50", "frames=3"];
+    killed_and_whole("chute", &sets, 6, 3);
+}
+
+#[test]
+fn a_killed_incline_goes_on() {
+    let sets = [
+        "scale=0.85",
+        "grains.count=300",
+        "contact.stiffness_scaled=2e3",
+        "time.relax=0.3",
+        "time.average=0.3",
+        "time.limit=0.9",
+    ];
+    killed_and_whole("incline-moderate", &sets, 7, 3);
+}
+
+#[test]
+fn a_run_that_is_killed_at_its_very_end_is_tidied_up() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = ["run", "two-spheres", "--out", "a"];
+    succeed(folder.path(), &run);
+    let at = |name: &str| folder.path().join("a").join(name);
+    // As if it had been killed behind its summary: no report yet, checkpoints and frames still there.
+    std::fs::remove_file(at("report.html")).unwrap();
+    std::fs::write(at("checkpoint.h5"), "any").unwrap();
+    std::fs::write(at("checkpoint.h5.partial"), "any").unwrap();
+    std::fs::create_dir(at("frames")).unwrap();
+    std::fs::write(at("frames/grains_000000000000.vtkhdf"), "any").unwrap();
+    let said = succeed(folder.path(), &[&run[..], &["--resume"]].concat());
+    assert!(said.contains("already done"), "{said}");
+    assert!(at("report.html").exists());
+    for name in ["checkpoint.h5", "checkpoint.h5.partial", "frames"] {
+        assert!(!at(name).exists(), "{name}");
+    }
+}
+
+#[test]
+fn a_run_that_is_killed_while_its_folder_is_made_begins_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join("a").join(name);
+    let run = ["run", "two-spheres", "--out", "a"];
+    let resume = [&run[..], &["--resume"]].concat();
+    // Its first file unfinished.
+    std::fs::create_dir(at("")).unwrap();
+    std::fs::write(at("summary.json.partial"), "{").unwrap();
+    succeed(folder.path(), &run);
+    let whole = hash(&at(""));
+    // Its summary alone: nothing else stands yet.
+    let text = std::fs::read_to_string(at("summary.json")).unwrap();
+    std::fs::remove_dir_all(at("")).unwrap();
+    std::fs::create_dir(at("")).unwrap();
+    std::fs::write(at("summary.json"), text.replace("\"done\"", "\"running\"")).unwrap();
+    succeed(folder.path(), &resume);
+    assert_eq!(hash(&at("")), whole);
+}
+
+/// Stops a run politely `wait` after it has begun to compute; false where it was done before that.
+fn interrupt(folder: &Path, arguments: &[&str], out: &Path, wait: Duration) -> bool {
+    let mut child = start(folder, arguments);
+    let begun =
+        || std::fs::read_to_string(out.join("log.txt")).is_ok_and(|l| l.contains("threads"));
+    let begin = Instant::now();
+    while !begun() && begin.elapsed() < PATIENCE {
+        std::thread::sleep(Duration::from_millis(1));
+    }
+    std::thread::sleep(wait);
+    let id = child.id().to_string();
+    Command::new("kill").args(["-INT", &id]).status().unwrap();
+    let code = child.wait().unwrap().code();
+    assert!(matches!(code, Some(0 | 130)), "{arguments:?}: {code:?}");
+    code == Some(130)
+}
+
+#[test]
+fn the_continuum_and_impacts_go_on_after_ctrl_c() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut random = ChaCha8Rng::seed_from_u64(8);
+    for (scene, sets) in [
+        (
+            "bagnold",
+            ["grid.cells=256", "grid.columns=3", "solver.growth=1.1"],
+        ),
+        (
+            "bagnold",
+            [
+                "grid.cells=600",
+                "solver.method=regularised",
+                "solver.growth=1.1",
+            ],
+        ),
+        (
+            "two-spheres",
+            ["steps_per_contact=1e6", "impact_degrees=40", "rows=100"],
+        ),
+        (
+            "sphere-on-plane",
+            ["steps_per_contact=1e6", "impact_degrees=40", "rows=100"],
+        ),
+    ] {
+        let out = |name: &str| folder.path().join(name);
+        let arguments = |name: &'static str| {
+            let mut list = vec!["run", scene, "--out", name];
+            for set in sets {
+                list.extend(["--set", set]);
+            }
+            list
+        };
+        let begin = Instant::now();
+        succeed(folder.path(), &arguments("whole"));
+        let duration = begin.elapsed();
+        let _ = std::fs::remove_dir_all(out("parts"));
+        let mut stops = 0;
+        let mut arguments = arguments("parts");
+        for _ in 0..3 {
+            let wait = duration.mul_f64(random.random_range(0.0..0.4));
+            if interrupt(folder.path(), &arguments, &out("parts"), wait) {
+                stops += 1;
+                assert!(out("parts").join("checkpoint.h5").exists(), "{scene}");
+            }
+            arguments.push("--resume");
+            arguments.dedup();
+        }
+        println!("{scene}: {duration:.1?}, {stops} stops");
+        assert!(stops > 0, "{scene} {duration:?}");
+        colluvium(folder.path(), &arguments);
+        assert_eq!(hash(&out("parts")), hash(&out("whole")), "{scene} {sets:?}");
+        for name in ["profile.csv", "trajectory.csv", "history.csv"] {
+            let bytes = |d: &str| std::fs::read(out(d).join(name)).ok();
+            assert_eq!(bytes("parts"), bytes("whole"), "{scene}: {name}");
+        }
+    }
+}
