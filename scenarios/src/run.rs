@@ -13,6 +13,7 @@ mod march_record;
 pub mod precheck;
 pub mod settle;
 pub mod step;
+mod tumbling_box;
 pub mod world;
 
 use crate::checkpoint::{Checkpoint, Checkpoints};

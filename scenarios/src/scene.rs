@@ -19,6 +19,7 @@ mod law_layers;
 mod layer_case;
 pub mod layers;
 mod settle;
+mod tumbling_box;
 pub mod world;
 
 pub use bagnold::{BagnoldGrid, BagnoldScene, FrictionLaw, RheologyKeys, SolverKeys, SolverMethod};
@@ -37,13 +38,14 @@ pub use law::{
 };
 pub use layer_case::{LayerCase, LayerVisitor};
 pub use settle::{SettleFloor, SettleGrains, SettleScene};
+pub use tumbling_box::{Attitude, BedKeys, LanderKeys, TumblingBoxScene};
 
 use crate::rheology_file;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// The names and texts of the bundled scenes.
-pub const BUNDLED: [(&str, &str); 9] = [
+pub const BUNDLED: [(&str, &str); 10] = [
     (
         "incline-moderate",
         include_str!("../scenes/incline-moderate.toml"),
@@ -65,6 +67,7 @@ pub const BUNDLED: [(&str, &str); 9] = [
     ("chute", include_str!("../scenes/chute.toml")),
     ("settle", include_str!("../scenes/settle.toml")),
     ("grains", include_str!("../scenes/grains.toml")),
+    ("tumbling-box", include_str!("../scenes/tumbling-box.toml")),
 ];
 
 /// The text of a bundled scene.

@@ -2,7 +2,7 @@
 //!
 //! A scene is a struct of keys, a recipe (`run::world::Recipe`) and a bundled file of the same name.
 
-use super::{GrainsScene, SceneError};
+use super::{GrainsScene, SceneError, TumblingBoxScene};
 use crate::run::world::Recipe;
 use serde_json::Value;
 
@@ -61,6 +61,8 @@ macro_rules! kinds {
 kinds! {
     /// A recipe of one's own.
     Grains(GrainsScene) = "grains",
+    /// A lander on a bed.
+    TumblingBox(TumblingBoxScene) = "tumbling-box",
 }
 
 /// Dotted paths of files in scenes of grains; `*` stands for any name.
