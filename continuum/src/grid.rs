@@ -152,6 +152,24 @@ impl Grid {
     /// An axis without cells or without length, or boundaries that leave the pressure
     /// undetermined.
     pub fn new(axes: [Axis; DIMENSIONS]) -> Result<Self, Error> {
+        let sets_pressure = axes.iter().any(|axis| match axis {
+            Axis::Bounded { low, high, .. } => {
+                low.outer_pressure().is_some() || high.outer_pressure().is_some()
+            }
+            _ => false,
+        });
+        if !sets_pressure {
+            return Err(Error::UndeterminedPressure);
+        }
+        Self::with_moving_surface(axes)
+    }
+
+    /// Makes a grid in which the surface of the material lies somewhere inside and sets the
+    /// pressure, so the boundaries need not.
+    ///
+    /// # Errors
+    /// An axis without cells or without length.
+    pub fn with_moving_surface(axes: [Axis; DIMENSIONS]) -> Result<Self, Error> {
         for axis in &axes {
             require(
                 axis.cells() >= 1,
@@ -173,15 +191,6 @@ impl Grid {
                 axis.spacing() * axis.cells() as f64,
                 "greater than 0",
             )?;
-        }
-        let sets_pressure = axes.iter().any(|axis| match axis {
-            Axis::Bounded { low, high, .. } => {
-                low.outer_pressure().is_some() || high.outer_pressure().is_some()
-            }
-            _ => false,
-        });
-        if !sets_pressure {
-            return Err(Error::UndeterminedPressure);
         }
         let mut grid = Self {
             axes,

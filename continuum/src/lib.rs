@@ -42,6 +42,7 @@ pub mod bagnold;
 pub mod discretisation;
 mod error;
 pub mod flow;
+pub mod free_surface;
 pub mod grid;
 pub mod layer;
 pub mod linear_solver;
