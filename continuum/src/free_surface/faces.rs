@@ -65,6 +65,7 @@ pub(crate) struct Faces {
     pub own: Vec<(usize, usize)>,
     /// Whether an unknown velocity belongs to a thin layer on a wall.
     pub is_thin: Vec<bool>,
+    acceleration: [f64; DIMENSIONS],
 }
 
 impl Faces {
@@ -72,9 +73,11 @@ impl Faces {
         grid: &Grid,
         topology: &Topology,
         fractions: &[f64],
+        acceleration: [f64; DIMENSIONS],
         thin_layer: ThinLayer,
     ) -> Self {
         let mut faces = Self {
+            acceleration,
             pressure: vec![NONE; topology.cells()],
             ..Self::default()
         };
@@ -122,7 +125,9 @@ impl Faces {
             if lies_on_wall(topology, fractions, component, face) {
                 return Face::Still;
             }
-            let on_wall = rough_wall_below(grid, topology, component, face).is_some();
+            let on_wall = self
+                .wall_under(grid, topology, component, face)
+                .is_some();
             if !on_wall || mass <= MASSLESS || thin_layer == ThinLayer::Following {
                 return Face::Loose;
             }
@@ -177,6 +182,27 @@ impl Faces {
         along.chain(diagonal).chain(against).find_map(own)
     }
 
+    /// The axis and the side (0 low, 1 high) of a wall along a face that carries the weight of what
+    /// lies on it, if there is one.
+    pub(crate) fn wall_under(
+        &self,
+        grid: &Grid,
+        topology: &Topology,
+        component: usize,
+        face: usize,
+    ) -> Option<(usize, usize)> {
+        let other = (0..DIMENSIONS).filter(|&axis| axis != component);
+        other.flat_map(|axis| [(axis, 0), (axis, 1)]).find(|&(axis, side)| {
+            let ends = topology.face_neighbours[component][face][axis][side] == NONE;
+            let edge = [0, grid.axes()[axis].cells()][side];
+            let rigid = grid.axes()[axis]
+                .boundary_at(edge)
+                .is_some_and(|boundary| boundary.outer_pressure().is_none());
+            let along = self.acceleration[component].abs();
+            ends && rigid && weight_onto(&self.acceleration, axis, side) > along
+        })
+    }
+
     /// Gives every face that follows the velocity of its unknown.
     pub(crate) fn spread(&self, unknowns: &[f64], velocity: &mut Velocity) {
         for (role, u) in self.role.iter().zip(velocity) {
@@ -200,21 +226,12 @@ fn lies_on_wall(topology: &Topology, fractions: &[f64], component: usize, face: 
     })
 }
 
-/// The axis and the side (0 low, 1 high) of a rough wall along a face, if there is one.
-pub(crate) fn rough_wall_below(
-    grid: &Grid,
-    topology: &Topology,
-    component: usize,
-    face: usize,
-) -> Option<(usize, usize)> {
-    (0..DIMENSIONS).filter(|&axis| axis != component).find_map(|axis| {
-        (0..2).find_map(|side| {
-            let ends = topology.face_neighbours[component][face][axis][side] == NONE;
-            let edge = [0, grid.axes()[axis].cells()][side];
-            let rough = grid.axes()[axis]
-                .boundary_at(edge)
-                .is_some_and(|boundary| boundary.wall_velocity().is_some());
-            (ends && rough).then_some((axis, side))
-        })
-    })
+/// Gravity normal to a wall on one side of an axis, positive towards the wall.
+pub(crate) fn weight_onto(
+    acceleration: &[f64; DIMENSIONS],
+    axis: usize,
+    side: usize,
+) -> f64 {
+    let towards = if side == 1 { 1.0 } else { -1.0 };
+    (towards * acceleration[axis]).max(0.0)
 }

@@ -12,7 +12,7 @@ use super::fraction::reconstruct;
 use super::operators::{Material, Operators, POINTS};
 use super::plane::Plane;
 use super::topology::{NONE, Topology};
-use super::transport::{MASSLESS, Motion, Transport, Velocity};
+use super::transport::{MASSLESS, Motion, Transport};
 use crate::discretisation::COMPONENTS;
 use crate::error::{Error, require};
 use crate::grid::{Axis, DIMENSIONS, Grid};
@@ -273,6 +273,22 @@ impl<R: Rheology> SurfaceFlow<R> {
         most.min(by_courant).min(self.options.largest_step)
     }
 
+    /// Moves the velocity on by `dt` without moving material: the way to a steady flow whose surface
+    /// stands still.
+    ///
+    /// # Errors
+    /// [`Error::NotConverged`].
+    pub fn accelerate_in_place(&mut self, dt: f64) -> Result<SurfaceStep, Error> {
+        let mut record = SurfaceStep::default();
+        if self.accelerate(dt, &mut record)? {
+            record.dt = dt;
+            record.max_speed = self.max_speed();
+            Ok(record)
+        } else {
+            Err(self.not_converged(dt, &record.residuals))
+        }
+    }
+
     /// Makes one step of at most `limit`. A step that does not converge is halved and tried again.
     ///
     /// # Errors
@@ -379,6 +395,7 @@ impl<R: Rheology> SurfaceFlow<R> {
             &self.grid,
             &self.topology,
             &self.state.fractions,
+            self.acceleration,
             self.options.thin_layer,
         );
         let Operators {

@@ -7,7 +7,7 @@
 //! to round-off. Quadrature points have the volume of material in their quarter of a cell, so what
 //! lies outside bears nothing and the surface is free of stress.
 
-use super::faces::{ACTIVE, Face, Faces, rough_wall_below};
+use super::faces::{ACTIVE, Face, Faces, weight_onto};
 use super::fraction::volume_in;
 use super::plane::Plane;
 use super::topology::{NONE, Topology};
@@ -17,7 +17,7 @@ use crate::discretisation::{
 use crate::grid::{Axis, DIMENSIONS, Grid};
 
 /// Smallest θ in the pressure gradient and in the pressure at walls.
-const NEAREST_SURFACE: f64 = 0.05;
+const NEAREST_SURFACE: f64 = 0.005;
 /// Smallest θ in the extrapolation of pressure beyond the surface.
 const NEAREST_EXTRAPOLATION: f64 = 0.25;
 /// Cells with less material have no quadrature points.
@@ -144,25 +144,19 @@ impl Material<'_> {
         }
     }
 
-    /// Gravity normal to a wall on one side of an axis, positive towards the wall.
-    fn weight_onto(&self, axis: usize, side: usize) -> f64 {
-        let towards = if side == 1 { 1.0 } else { -1.0 };
-        (towards * self.acceleration[axis]).max(0.0)
-    }
-
     /// Force of the slope of their own surface on the velocities of thin layers.
     fn add_thin_layers(&self, parts: &mut Parts) {
         for (j, &(component, face)) in self.faces.own.iter().enumerate() {
             if !self.faces.is_thin[j] {
                 continue;
             }
-            let wall = rough_wall_below(self.grid, self.topology, component, face);
+            let wall = self.faces.wall_under(self.grid, self.topology, component, face);
             let Some((axis, side)) = wall else { continue };
             let [low, high] = self.topology.face_cells[component][face];
             let thickness = self.grid.axes()[axis].spacing();
             let slope = (self.fractions[high] - self.fractions[low]) * thickness
                 / self.grid.axes()[component].spacing();
-            parts.boundary_load[j] -= parts.mass[j] * self.weight_onto(axis, side) * slope;
+            parts.boundary_load[j] -= parts.mass[j] * weight_onto(&self.acceleration, axis, side) * slope;
         }
     }
 
@@ -324,7 +318,7 @@ impl Material<'_> {
             let side = usize::from(corner[axis] > 0);
             let spacing = axes[axis].spacing();
             if self.fractions[cell] <= ACTIVE {
-                let weight = self.weight_onto(axis, side) * self.fractions[cell] * spacing;
+                let weight = weight_onto(&self.acceleration, axis, side) * self.fractions[cell] * spacing;
                 point.pressure_offset += share * weight;
                 continue;
             }

@@ -457,8 +457,9 @@ impl<R: Rheology> YieldSolver<R> for PrimalDual {
                 line_search: true,
             },
         ];
-        // Without stress there is nothing warm to start from.
-        let is_cold = state.s.iter().all(|s| *s == [0.0; COMPONENTS]);
+        // Without stress there is nothing warm to start from, unless the material has none.
+        let is_cold = state.s.iter().all(|s| *s == [0.0; COMPONENTS])
+            && problem.rheology.threshold(1.0, 1.0).stress > 0.0;
         let mut report = StepReport::default();
         for strategy in &strategies[usize::from(is_cold)..] {
             self.attempt(problem, state, strategy, &mut report);
