@@ -46,9 +46,9 @@ impl Default for SurfaceOptions {
             thin_layer: ThinLayer::default(),
             solver: PrimalDualOptions {
                 strain_rate_floor: 1e-5,
-                momentum_tolerance: 1e-6,
+                momentum_tolerance: 1e-5,
                 divergence_tolerance: 1e-8,
-                stress_tolerance: 1e-6,
+                stress_tolerance: 1e-4,
                 one_sided_pressure: true,
                 ..PrimalDualOptions::default()
             },
@@ -102,6 +102,8 @@ pub struct SurfaceStep {
     pub max_speed: f64,
 }
 
+/// Stands for the pressure of cells that have none.
+const INACTIVE: f64 = -1.0;
 /// Most times that a step is halved.
 const MAX_CUTS: usize = 8;
 /// Share of the pattern's room: first step from rest, as a fraction of the free fall through a cell.
@@ -114,7 +116,7 @@ pub struct SurfaceState {
     pub fractions: Vec<f64>,
     /// Velocity on each face of each component.
     pub velocity: [Vec<f64>; DIMENSIONS],
-    /// Pressure of each cell, zero where there is none.
+    /// Pressure of each cell, negative where there is none.
     pub pressure: Vec<f64>,
     /// Stress at each corner of each cell.
     pub stress: Vec<[f64; COMPONENTS]>,
@@ -160,7 +162,7 @@ impl<R: Rheology> SurfaceFlow<R> {
         let topology = Topology::new(&grid);
         let state = SurfaceState {
             velocity: std::array::from_fn(|c| vec![0.0; topology.faces(c)]),
-            pressure: vec![0.0; topology.cells()],
+            pressure: vec![INACTIVE; topology.cells()],
             stress: vec![[0.0; COMPONENTS]; topology.cells() * POINTS],
             fractions,
             ..SurfaceState::default()
@@ -299,14 +301,21 @@ impl<R: Rheology> SurfaceFlow<R> {
             self.first_half_step(&mut record)?;
         }
         self.saved.clone_from(&self.state);
-        let mut dt = self.state.next_step.min(limit);
+        let planned = self.state.next_step;
+        // Two even steps rather than a long one and a splinter.
+        let mut dt = match limit / planned {
+            ratio if ratio <= 1.0 => limit,
+            ratio if ratio < 2.0 => 0.5 * limit,
+            _ => planned,
+        };
+        let mut growing_from = planned;
         for _ in 0..=MAX_CUTS {
             self.transport(dt);
             // The velocity moves on by the mean of this step and the next.
-            let next = self.allowed_step(dt);
+            let next = self.allowed_step(growing_from);
             let converged = self.accelerate(0.5 * (dt + next), &mut record)?;
             if converged {
-                self.state.next_step = self.allowed_step(dt).min(next);
+                self.state.next_step = self.allowed_step(growing_from).min(next);
                 self.state.time += dt;
                 self.state.steps += 1;
                 record.time = self.state.time;
@@ -317,6 +326,7 @@ impl<R: Rheology> SurfaceFlow<R> {
             record.cuts += 1;
             self.state.clone_from(&self.saved);
             dt *= 0.5;
+            growing_from = dt;
         }
         Err(self.not_converged(dt, &record.residuals))
     }
@@ -466,6 +476,13 @@ impl<R: Rheology> SurfaceFlow<R> {
         self.unknowns
             .p
             .extend(faces.active.iter().map(|&cell| self.state.pressure[cell]));
+        // A cell that was not active before has no pressure yet, which is not to say that it has
+        // let go.
+        for (p, &cell) in self.unknowns.p.iter_mut().zip(&faces.active) {
+            if self.state.pressure[cell] < 0.0 {
+                *p = f64::MIN_POSITIVE;
+            }
+        }
         self.unknowns.s.clear();
         self.unknowns
             .s
@@ -484,10 +501,11 @@ impl<R: Rheology> SurfaceFlow<R> {
             }
         }
         faces.spread(&self.unknowns.u, &mut self.state.velocity);
-        self.state.pressure.fill(0.0);
+        self.state.pressure.fill(INACTIVE);
         for (&cell, p) in faces.active.iter().zip(&self.unknowns.p) {
             self.state.pressure[cell] = *p;
         }
+
         self.state.stress.fill([0.0; COMPONENTS]);
         for (&place, s) in places.iter().zip(&self.unknowns.s) {
             self.state.stress[place] = *s;

@@ -147,8 +147,8 @@ impl PrimalDual {
     ) {
         self.trial.clone_from(start);
         let mut floor = strategy.first_floor;
-        for _ in 0..strategy.max_iterations {
-            self.release(problem.discretisation);
+        for iteration in 0..strategy.max_iterations {
+            self.release(problem.discretisation, iteration == 0);
             self.linearise(problem, floor);
             self.assemble(problem, &start.u);
             report.iterations += 1;
@@ -243,13 +243,19 @@ impl PrimalDual {
     /// Decides which cells let go: those that would have to be pulled together to keep their
     /// volume (p ≥ 0 and ∇·u ≥ 0 complement each other). Fills the continuity part of the
     /// right-hand side.
-    fn release(&mut self, discretisation: &Discretisation) {
+    /// The first iteration goes by the pressure alone, because the velocity that a step begins with
+    /// has a divergence of its own.
+    fn release(&mut self, discretisation: &Discretisation, is_first: bool) {
         let continuity = &mut self.right_hand_side[self.trial.u.len()..];
         divergence_residual(discretisation, &self.trial.u, continuity);
         if self.options.one_sided_pressure {
             let volume = discretisation.grid().cell_volume();
             for ((released, p), d) in self.released.iter_mut().zip(&self.trial.p).zip(continuity) {
-                *released = p - *d / volume <= 0.0;
+                *released = if is_first {
+                    *p <= 0.0
+                } else {
+                    p - *d / volume <= 0.0
+                };
             }
         }
     }
