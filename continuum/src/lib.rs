@@ -44,6 +44,7 @@ pub mod bagnold;
 pub mod discretisation;
 mod error;
 pub mod flow;
+pub mod free_surface;
 pub mod grid;
 pub mod heap;
 pub mod layer;
