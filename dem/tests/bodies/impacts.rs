@@ -253,3 +253,135 @@ fn oblique_impacts_of_two_bodies_keep_energy_and_both_momenta() {
         );
     }
 }
+
+/// Elastic impacts of a thrown body on something that stands still.
+fn on_wall(wall: Wall, parts: &[Part], target: Vector3<f64>, seed: u64) -> (f64, usize) {
+    let mut dice = Dice::new(seed);
+    let (mut worst, mut met) = (0.0_f64, 0);
+    for _ in 0..3 {
+        let towards = Vector3::new(0.3, -0.2, -1.0).normalize();
+        let body = Body::new(parts.to_vec())
+            .at(target - towards * 0.3)
+            .turned(dice.orientation())
+            .moving(towards * 2.0, dice.vector(2.0));
+        let setup = setup(hertz(), vec![body], vec![wall.clone()], 7e-7);
+        let mut s = Simulation::new(setup).unwrap();
+        let before = kinetic(&mut s);
+        met += usize::from(through_impact(&mut s, 100, 4_000) > 0);
+        worst = worst.max((kinetic(&mut s) / before - 1.0).abs());
+    }
+    (worst, met)
+}
+
+#[test]
+fn corners_edges_and_curved_walls_keep_energy() {
+    let cuboid = [Part::cuboid(HALF.into(), DENSITY).rounded(0.02)];
+    let drum = [Part::cylinder(0.1, 0.25, DENSITY).rounded(0.02)];
+    let side = Vector3::new(0.3, 0.0, 0.0);
+    let plate = [side, Vector3::new(0.0, 0.2, 0.05)];
+    let peak = {
+        let base = |x: f64, y: f64| Vector3::new(x, y, -0.3);
+        let vertices = vec![
+            Vector3::zeros(),
+            base(0.3, 0.2),
+            base(-0.2, 0.25),
+            base(0.0, -0.3),
+        ];
+        let mesh = Mesh::new(vertices, &[[0, 1, 2], [0, 2, 3], [0, 3, 1]]).unwrap();
+        Wall::mesh(Arc::new(mesh))
+    };
+    let zero = Vector3::zeros();
+    for (name, wall, target) in [
+        (
+            "ball",
+            Wall::sphere(-Vector3::z() * 0.1, 0.1, Side::Outside),
+            zero,
+        ),
+        ("edge of a plate", Wall::rectangle(-side, plate), zero),
+        ("peak of a mesh", peak, zero),
+        (
+            "bar",
+            Wall::cylinder(-Vector3::z() * 0.05, Vector3::y(), 0.05, Side::Outside),
+            zero,
+        ),
+        (
+            "block",
+            Wall::cuboid(Vector3::new(-0.2, 0.1, -0.2), Vector3::repeat(0.2)),
+            zero,
+        ),
+        (
+            "drum",
+            Wall::cylinder(Vector3::zeros(), Vector3::y(), 0.5, Side::Inside),
+            Vector3::new(0.0, 0.0, -0.4),
+        ),
+    ] {
+        for (shape, parts) in [("cuboid", &cuboid), ("cylinder", &drum)] {
+            let (worst, met) = on_wall(wall.clone(), parts, target, 2);
+            println!("{shape} on a {name}: {worst:e}, {met} met");
+            assert!(met >= 2, "{shape} on a {name}: {met}");
+            assert!(worst < 1e-8, "{shape} on a {name}: {worst:e}");
+        }
+    }
+}
+
+#[test]
+fn a_corner_and_a_flat_face_have_the_restitution_of_their_law() {
+    // Newton's rule at the contact point, in the limit of a stiff contact.
+    let restitution = 0.6;
+    let about = |axis: Vector3<f64>, angle: f64| UnitQuaternion::from_scaled_axis(axis * angle);
+    for (name, turn) in [
+        ("flat", UnitQuaternion::identity()),
+        ("edge", about(Vector3::x(), 0.5)),
+        ("corner", UnitQuaternion::from_euler_angles(0.5, 0.4, 0.0)),
+    ] {
+        let law = ContactLaw {
+            tangential: Tangential::None,
+            ..rough(1e9, restitution, 0.0)
+        };
+        let part = Part::cuboid(HALF.into(), DENSITY).rounded(0.02);
+        let body = over_floor(vec![part], turn, -Vector3::z(), Vector3::zeros());
+        let mut s = Simulation::new(setup(law, vec![body], vec![floor()], 2e-7)).unwrap();
+        let mut snapshot = Snapshot::default();
+        let mut approach = None;
+        let normal_speed =
+            |b: &BodySample, at: Vector3<f64>| (b.velocity + b.spin.cross(&(at - b.centre))).z;
+        let mut last = Vector3::zeros();
+        let ratio = loop {
+            s.advance(1).unwrap();
+            s.snapshot(&mut snapshot);
+            let b = &snapshot.bodies[0];
+            let count = snapshot.body_contacts.len() as f64;
+            if count > 0.0 {
+                last = snapshot
+                    .body_contacts
+                    .iter()
+                    .map(|c| c.point)
+                    .sum::<Vector3<f64>>()
+                    / count;
+                approach.get_or_insert(normal_speed(b, last));
+            } else if let Some(approach) = approach {
+                break -normal_speed(b, last) / approach;
+            }
+            assert!(s.time() < 0.03);
+        };
+        println!("{name}: restitution {ratio:.4}, asked for {restitution}");
+        assert!((ratio - restitution).abs() < 5e-3, "{name}: {ratio}");
+    }
+}
+
+#[test]
+fn no_impact_of_a_lander_with_a_bump_gains_energy() {
+    let mut dice = Dice::new(1);
+    let mut highest: f64 = 0.0;
+    for _ in 0..100 {
+        let law = rough(1e6, 0.6, 0.5);
+        let (velocity, spin) = (dice.vector(0.2) - Vector3::z() * 0.3, dice.vector(1.0));
+        let body = over_floor(lander(), dice.orientation(), velocity, spin);
+        let mut s = Simulation::new(setup(law, vec![body], vec![floor()], 1e-5)).unwrap();
+        let before = kinetic(&mut s);
+        assert!(through_impact(&mut s, 50, 2_000) > 0);
+        highest = highest.max(kinetic(&mut s) / before);
+    }
+    println!("largest outgoing over incoming energy of 100: {highest}");
+    assert!(highest <= 1.0, "{highest}");
+}

@@ -4,5 +4,7 @@
 
 mod grains;
 mod impacts;
+mod rest;
 mod scene;
 mod tops;
+mod world;
