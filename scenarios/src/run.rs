@@ -2,7 +2,9 @@
 
 pub mod bagnold;
 pub mod bed;
+mod boulder;
 pub mod chute;
+mod comet_ball;
 pub mod energy_table;
 pub mod grain_table;
 mod grains;
@@ -12,6 +14,7 @@ pub mod incline;
 pub mod precheck;
 pub mod settle;
 pub mod step;
+mod tensile;
 pub mod world;
 
 use crate::checkpoint::{self, Checkpoint};
