@@ -2,7 +2,9 @@
 
 pub mod bagnold;
 pub mod bed;
+mod boulder;
 pub mod chute;
+mod comet_ball;
 pub mod energy_table;
 pub mod grain_table;
 mod grains;
@@ -13,6 +15,7 @@ mod march_record;
 pub mod precheck;
 pub mod settle;
 pub mod step;
+mod tensile;
 pub mod world;
 
 use crate::checkpoint::{Checkpoint, Checkpoints};

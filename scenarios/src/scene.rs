@@ -6,8 +6,10 @@
 
 mod bagnold;
 mod bed;
+mod boulder;
 mod check;
 mod chute;
+mod comet;
 mod error;
 mod friction_keys;
 mod grains;
@@ -19,11 +21,14 @@ mod law_layers;
 mod layer_case;
 pub mod layers;
 mod settle;
+mod tensile;
 pub mod world;
 
 pub use bagnold::{BagnoldGrid, BagnoldScene, FrictionLaw, RheologyKeys, SolverKeys, SolverMethod};
 pub use bed::Pace;
+pub use boulder::BoulderScene;
 pub use chute::ChuteScene;
+pub use comet::{CometKeys, CometPreparationKeys, MixKind};
 pub use error::SceneError;
 pub use grains::GrainsScene;
 pub use impact::{ImpactScene, RollingKeys};
@@ -37,13 +42,14 @@ pub use law::{
 };
 pub use layer_case::{LayerCase, LayerVisitor};
 pub use settle::{SettleFloor, SettleGrains, SettleScene};
+pub use tensile::{ClampKind, TensileScene};
 
 use crate::rheology_file;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// The names and texts of the bundled scenes.
-pub const BUNDLED: [(&str, &str); 9] = [
+pub const BUNDLED: [(&str, &str); 11] = [
     (
         "incline-moderate",
         include_str!("../scenes/incline-moderate.toml"),
@@ -65,6 +71,8 @@ pub const BUNDLED: [(&str, &str); 9] = [
     ("chute", include_str!("../scenes/chute.toml")),
     ("settle", include_str!("../scenes/settle.toml")),
     ("grains", include_str!("../scenes/grains.toml")),
+    ("tensile-test", include_str!("../scenes/tensile-test.toml")),
+    ("boulder-drop", include_str!("../scenes/boulder-drop.toml")),
 ];
 
 /// The text of a bundled scene.

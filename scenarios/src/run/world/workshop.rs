@@ -232,6 +232,21 @@ impl<'a> Workshop<'a> {
         Ok(())
     }
 
+    /// Lets the grains go for a time (s), and stops what still moves.
+    pub fn let_go(&mut self, around: &Surroundings, time: f64) -> Result<(), Failure> {
+        let mut simulation = self.simulation(around)?;
+        let steps = (time / simulation.timestep()).ceil() as u64;
+        simulation
+            .advance(steps)
+            .map_err(|error| Failure::Run(format!("preparation: {error}")))?;
+        simulation.damp(0.0);
+        self.take(simulation);
+        if crate::interruption::requested() {
+            return Err(ended(SetupError::Interrupted));
+        }
+        Ok(())
+    }
+
     /// Pulls a cloud to a point until it is dense enough.
     pub fn compact(
         &mut self,
