@@ -1,6 +1,8 @@
 //! Running a scene: directory, checkpoints, results.
 
+mod angle_of_repose;
 pub mod bagnold;
+mod ball_impact;
 pub mod bed;
 pub mod chute;
 pub mod energy_table;
@@ -12,6 +14,7 @@ pub mod incline;
 mod march_record;
 pub mod precheck;
 pub mod settle;
+mod silo;
 pub mod step;
 pub mod world;
 

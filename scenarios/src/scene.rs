@@ -4,7 +4,9 @@
 //! bundled scene of that kind, so every default has one home: the bundled file. The same schema
 //! that `colluvium schema` prints is what input is checked against.
 
+mod angle_of_repose;
 mod bagnold;
+mod ball_impact;
 mod bed;
 mod check;
 mod chute;
@@ -17,9 +19,12 @@ mod law;
 mod law_layers;
 pub mod layers;
 mod settle;
+mod silo;
 pub mod world;
 
+pub use angle_of_repose::AngleOfReposeScene;
 pub use bagnold::{BagnoldGrid, BagnoldScene, RheologyKeys, SolverKeys, SolverMethod};
+pub use ball_impact::BallImpactScene;
 pub use bed::Pace;
 pub use chute::ChuteScene;
 pub use error::SceneError;
@@ -34,13 +39,14 @@ pub use law::{
     CohesionKind, LawKeys, LeverKind, MemoryKind, NormalKind, Parts, RollingKind, TangentialKind,
 };
 pub use settle::{SettleFloor, SettleGrains, SettleScene};
+pub use silo::SiloScene;
 
 use crate::rheology_file;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// The names and texts of the bundled scenes.
-pub const BUNDLED: [(&str, &str); 9] = [
+pub const BUNDLED: [(&str, &str); 12] = [
     (
         "incline-moderate",
         include_str!("../scenes/incline-moderate.toml"),
@@ -62,6 +68,12 @@ pub const BUNDLED: [(&str, &str); 9] = [
     ("chute", include_str!("../scenes/chute.toml")),
     ("settle", include_str!("../scenes/settle.toml")),
     ("grains", include_str!("../scenes/grains.toml")),
+    (
+        "angle-of-repose",
+        include_str!("../scenes/angle-of-repose.toml"),
+    ),
+    ("silo", include_str!("../scenes/silo.toml")),
+    ("ball-impact", include_str!("../scenes/ball-impact.toml")),
 ];
 
 /// The text of a bundled scene.
