@@ -1,6 +1,8 @@
 //! Running a scene: directory, checkpoints, results.
 
+mod angle_of_repose;
 pub mod bagnold;
+mod ball_impact;
 pub mod bed;
 mod boulder;
 pub mod chute;
@@ -14,6 +16,7 @@ pub mod incline;
 mod march_record;
 pub mod precheck;
 pub mod settle;
+mod silo;
 pub mod step;
 mod tensile;
 pub mod world;

@@ -4,7 +4,9 @@
 //! bundled scene of that kind, so every default has one home: the bundled file. The same schema
 //! that `colluvium schema` prints is what input is checked against.
 
+mod angle_of_repose;
 mod bagnold;
+mod ball_impact;
 mod bed;
 mod boulder;
 mod check;
@@ -21,10 +23,13 @@ mod law_layers;
 mod layer_case;
 pub mod layers;
 mod settle;
+mod silo;
 mod tensile;
 pub mod world;
 
+pub use angle_of_repose::AngleOfReposeScene;
 pub use bagnold::{BagnoldGrid, BagnoldScene, FrictionLaw, RheologyKeys, SolverKeys, SolverMethod};
+pub use ball_impact::BallImpactScene;
 pub use bed::Pace;
 pub use boulder::BoulderScene;
 pub use chute::ChuteScene;
@@ -42,6 +47,7 @@ pub use law::{
 };
 pub use layer_case::{LayerCase, LayerVisitor};
 pub use settle::{SettleFloor, SettleGrains, SettleScene};
+pub use silo::SiloScene;
 pub use tensile::{ClampKind, TensileScene};
 
 use crate::rheology_file;
@@ -49,7 +55,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// The names and texts of the bundled scenes.
-pub const BUNDLED: [(&str, &str); 11] = [
+pub const BUNDLED: [(&str, &str); 14] = [
     (
         "incline-moderate",
         include_str!("../scenes/incline-moderate.toml"),
@@ -73,6 +79,12 @@ pub const BUNDLED: [(&str, &str); 11] = [
     ("grains", include_str!("../scenes/grains.toml")),
     ("tensile-test", include_str!("../scenes/tensile-test.toml")),
     ("boulder-drop", include_str!("../scenes/boulder-drop.toml")),
+    (
+        "angle-of-repose",
+        include_str!("../scenes/angle-of-repose.toml"),
+    ),
+    ("silo", include_str!("../scenes/silo.toml")),
+    ("ball-impact", include_str!("../scenes/ball-impact.toml")),
 ];
 
 /// The text of a bundled scene.

@@ -2,7 +2,9 @@
 //!
 //! A scene is a struct of keys, a recipe (`run::world::Recipe`) and a bundled file of the same name.
 
-use super::{BoulderScene, GrainsScene, SceneError, TensileScene};
+use super::{
+    AngleOfReposeScene, BallImpactScene, BoulderScene, GrainsScene, SceneError, SiloScene, TensileScene,
+};
 use crate::run::world::Recipe;
 use serde_json::Value;
 
@@ -65,10 +67,16 @@ kinds! {
     Tensile(TensileScene) = "tensile-test",
     /// A boulder dropped on a plane.
     Boulder(BoulderScene) = "boulder-drop",
+    /// The angle at which an avalanche comes to rest.
+    AngleOfRepose(AngleOfReposeScene) = "angle-of-repose",
+    /// Silos that run out.
+    Silo(SiloScene) = "silo",
+    /// A ball that falls into a bed.
+    BallImpact(BallImpactScene) = "ball-impact",
 }
 
 /// Dotted paths of files in scenes of grains; `*` stands for any name.
-const FILES: [&str; 3] = ["walls.*.file", "walls.*.motion.file", "gravity.file"];
+const FILES: [&str; 4] = ["bed", "walls.*.file", "walls.*.motion.file", "gravity.file"];
 
 /// Makes relative paths of a scene file relative to that file's folder.
 pub(super) fn anchor(table: &mut toml::Table, folder: &std::path::Path) {
