@@ -1,13 +1,19 @@
 //! The simulation: one state, one step.
 
+mod diverged;
+mod lists;
+
+pub use diverged::Diverged;
+pub(crate) use lists::Layout;
+
 use crate::bonds::Bonds;
 use crate::boundaries::{Drain, MovingBox};
 use crate::contact::composition::Visitor;
-use crate::contact::{ContactLaw, Interaction, LawTable, Step};
+use crate::contact::{Interaction, LawTable, Step};
 use crate::contacts::Touching;
 use crate::domain::{Domain, Images};
-use crate::forces::{self, Field};
-use crate::grains::{Grains, vector};
+use crate::forces::Field;
+use crate::grains::Grains;
 use crate::gravity::Gravity;
 use crate::lanes::Width;
 use crate::ledger::EnergyLedger;
@@ -15,110 +21,15 @@ use crate::loads::Loads;
 use crate::motion::{self, Motion};
 use crate::neighbours::Neighbours;
 use crate::places::Places;
-use crate::population::GONE;
-use crate::reach::{Making, Reach};
+use crate::reach::Reach;
 use crate::rows::Rows;
 use crate::setup::{Setup, SetupError, Threads};
 use crate::snapshot::GrainSample;
 use crate::sweep::{self, Moved, Pass, Sweep};
-use crate::timestep::{self, Body, Classes, Conditions, Remedy, Shares};
-use crate::walls::{Age, Course, Scene, Span, Standing, Wall, WallContacts};
+use crate::walls::{Course, Scene, Span, Standing, Wall, WallContacts};
+use lists::{LayoutOf, SKIN, hold_of, skin_of};
 use nalgebra::Vector3;
 use std::sync::Arc;
-
-/// The step no longer follows the motion.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum Diverged {
-    /// A position is no longer a number.
-    #[error(
-        "grain {grain} has left the range of numbers at t = {time:e} s: the time step of \
-         {timestep:e} s is too long for the stiffness and speeds of this scene; {remedy}"
-    )]
-    Escape {
-        /// Number of the grain.
-        grain: u32,
-        /// When it was found (s).
-        time: f64,
-        /// The step (s).
-        timestep: f64,
-        /// A step that would do.
-        remedy: Remedy,
-    },
-    /// Grains have run through each other.
-    #[error(
-        "grains overlapped by {overlap:.2} of their radius before t = {time:e} s: the time step of \
-         {timestep:e} s is too long, or the grains are too soft for their speeds; {remedy}"
-    )]
-    Overlap {
-        /// Overlap over the harmonic mean radius.
-        overlap: f64,
-        /// When it was found (s).
-        time: f64,
-        /// The step (s).
-        timestep: f64,
-        /// A step that would do.
-        remedy: Remedy,
-    },
-    /// A moving box has become too narrow.
-    #[error("at t = {time:e} s: {narrow}")]
-    Narrow {
-        /// When (s).
-        time: f64,
-        /// Which axis, and what it must be.
-        narrow: Box<SetupError>,
-    },
-    /// Grains move against each other by more than the search can follow.
-    #[error(
-        "grains approached each other by more than {skin:e} m in the one step before t = {time:e} s: \
-         the time step of {timestep:e} s is too long for their speeds; {remedy}"
-    )]
-    Leap {
-        /// The list's skin (m).
-        skin: f64,
-        /// When it was found (s).
-        time: f64,
-        /// The step (s).
-        timestep: f64,
-        /// A step that would do.
-        remedy: Remedy,
-    },
-}
-
-/// An overlap, over the harmonic mean radius, that no run of ours means: grains half way through.
-const RUN_THROUGH: f64 = 1.0;
-
-/// Overlap over the harmonic mean radius for which a failed run's better step is computed.
-const FAILING_OVERLAP: f64 = 0.1;
-
-/// Skin of the Verlet list in smallest-grain diameters, chosen by measurement on the inclined flow.
-const SKIN: f64 = 0.3;
-
-/// What the lists must carry for a law.
-#[derive(Clone, Copy, Debug)]
-pub(crate) struct Layout {
-    /// Numbers of history of a contact.
-    pub history: usize,
-    /// How many of them change sign with the order of a pair.
-    pub flips: usize,
-    /// Rows of a contact's slot.
-    pub slot_rows: usize,
-    /// Whether contacts hold across a gap.
-    pub holds: bool,
-}
-
-struct LayoutOf;
-
-impl Visitor for LayoutOf {
-    type Output = Layout;
-    fn visit<I: Interaction>(self, _: &I) -> Layout {
-        Layout {
-            history: I::HISTORY,
-            flips: I::FLIPS,
-            slot_rows: forces::slot_rows::<I>(),
-            holds: I::HOLDS,
-        }
-    }
-}
 
 /// A pass over all grains under the scene's law.
 struct RunPass<'a> {
@@ -193,17 +104,6 @@ pub struct Simulation {
     rebuilds: u64,
 }
 
-/// Skin of the Verlet list for grains of this smallest radius (m).
-fn skin_of(smallest: f64) -> f64 {
-    SKIN * 2.0 * if smallest.is_finite() { smallest } else { 1.0 }
-}
-
-/// Largest gap that a contact of grains up to this radius holds across (m).
-fn hold_of(law: &LawTable, largest: f64) -> f64 {
-    let hold = |law: &ContactLaw| law.reach(largest);
-    law.laws().iter().map(hold).fold(0.0, f64::max)
-}
-
 /// Walls at the start.
 fn stand(walls: Vec<Wall>, timestep: f64) -> Vec<Standing> {
     let before = Span::ending(0, timestep);
@@ -211,15 +111,6 @@ fn stand(walls: Vec<Wall>, timestep: f64) -> Vec<Standing> {
     walls
         .map(|wall| Standing::at(wall, before, Course::default()))
         .collect()
-}
-
-/// How long the Verlet list has lasted.
-fn age_of(list: &Neighbours) -> Age<'_> {
-    Age {
-        rows: &list.rows,
-        travel: &list.travel,
-        time: list.age,
-    }
 }
 
 impl Simulation {
@@ -458,214 +349,6 @@ impl Simulation {
         let list = &mut self.list;
         list.watch.spend(&mut list.allowance, farthest, dt);
         list.watch.spend(&mut self.reach.allowance, farthest, dt);
-    }
-
-    /// Renews the lists where grains may have outrun them.
-    fn keep_lists(&mut self) -> Result<(), Diverged> {
-        self.check_width()?;
-        if self.list.outdated(self.skin) {
-            self.outlived(self.list.age)?;
-            self.rebuild();
-            return Ok(());
-        }
-        if self.wall_contacts.outdated(&self.walls, age_of(&self.list)) {
-            self.outlived(self.wall_contacts.age(self.list.age))?;
-            self.wall_contacts.take_down(|grain| grain);
-            self.list_walls();
-        }
-        if self.reach.outdated(&self.list) {
-            self.make_reach(false);
-        }
-        Ok(())
-    }
-
-    /// Checks the state before a list of this age (s) is made anew: one that does not outlive one step
-    /// cannot promise that no contact was missed.
-    fn outlived(&self, age: f64) -> Result<(), Diverged> {
-        self.check()?;
-        if age < 1.5 * self.timestep {
-            return Err(Diverged::Leap {
-                skin: self.skin,
-                time: self.time(),
-                timestep: self.timestep,
-                remedy: self.remedy(true),
-            });
-        }
-        Ok(())
-    }
-
-    /// Lists the grains near walls.
-    pub(crate) fn list_walls(&mut self) {
-        self.wall_contacts.list(
-            &mut self.walls,
-            &self.grains,
-            &self.domain,
-            self.skin + self.hold,
-            age_of(&self.list),
-        );
-    }
-
-    fn check(&self) -> Result<(), Diverged> {
-        let (time, timestep) = (self.time(), self.timestep);
-        if self.deepest > RUN_THROUGH {
-            return Err(Diverged::Overlap {
-                overlap: self.deepest,
-                time,
-                timestep,
-                remedy: self.remedy(false),
-            });
-        }
-        let n = self.grains.len();
-        let lost = |x: &[f64; 4]| !x.iter().all(|c| c.abs() < 1e150);
-        match self.grains.place[..n].iter().position(lost) {
-            None => Ok(()),
-            Some(i) => Err(Diverged::Escape {
-                grain: self.grains.id[i],
-                time,
-                timestep,
-                remedy: self.remedy(false),
-            }),
-        }
-    }
-
-    /// What limits the step: classes of grains alike, and the walls.
-    pub(crate) fn classes(&self) -> Classes {
-        let bodies = (0..self.grains.len()).map(|i| Body {
-            material: self.grains.material[i],
-            radius: self.grains.place[i][3],
-            mass: self.grains.mass[i],
-            fixed: self.grains.is_fixed(i),
-        });
-        let walls: Vec<u16> = self.walls.iter().map(|w| w.wall.material).collect();
-        Classes::of(bodies, &walls)
-    }
-
-    /// A step that would do for these grains: that of contacts under a large overlap, and in a `leap`
-    /// that of the speeds, unless the contacts themselves have blown up.
-    fn remedy(&self, leap: bool) -> Remedy {
-        let classes = self.classes();
-        let choice = |speed: f64| {
-            let conditions = Conditions {
-                speed,
-                overlap: FAILING_OVERLAP,
-                pressure: 0.0,
-            };
-            let shares = Shares::default();
-            let mut limits = timestep::limits_of(&classes, &self.law, &conditions, &shares);
-            limits.extend(self.bond_limit());
-            timestep::choose(limits, 1.0)
-        };
-        let mut choice_now = choice(0.0);
-        if leap && self.timestep <= choice_now.seconds {
-            // Two grains may meet head on.
-            let n = self.grains.len();
-            let speeds = self.grains.motion[..n].iter().map(|v| vector(v).norm());
-            choice_now = choice(2.0 * speeds.fold(0.0, f64::max));
-        }
-        Remedy {
-            seconds: choice_now.seconds,
-            limit: choice_now.binding,
-            exceeded: self.timestep > choice_now.seconds,
-        }
-    }
-
-    /// Checks that the box suits grains between two radii.
-    pub(crate) fn check_box(&self, largest: f64, smallest: f64) -> Result<(), SetupError> {
-        crate::setup::check_box(&self.domain, largest, skin_of(smallest))
-    }
-
-    /// Chooses how far lists reach for grains between two radii.
-    pub(crate) fn size_lists(&mut self, smallest: f64, largest: f64) {
-        self.set_skin(skin_of(smallest));
-        self.hold = hold_of(&self.law, largest);
-    }
-
-    /// Takes other laws of the same parts.
-    pub(crate) fn set_laws(&mut self, laws: LawTable) {
-        let n = self.grains.len();
-        let largest = self.grains.place[..n]
-            .iter()
-            .map(|x| x[3])
-            .fold(0.0, f64::max);
-        self.hold = hold_of(&laws, largest);
-        self.law = Arc::new(laws);
-    }
-
-    pub(crate) fn set_skin(&mut self, skin: f64) {
-        self.skin = skin;
-        self.reach.set_diameter(skin / SKIN);
-    }
-
-    pub(crate) fn rebuild(&mut self) {
-        self.rebuild_from(&|old| old);
-    }
-
-    /// Builds all lists anew; `remaining` says where a grain of the old lists is now, if it is.
-    pub(crate) fn rebuild_from(&mut self, remaining: &dyn Fn(u32) -> u32) {
-        self.fold_impulses();
-        self.wrap_grains();
-        let (cell, listed) = (self.cell(), self.skin + self.hold);
-        self.list
-            .build(&mut self.grains, &cell, listed, self.parallel);
-        let list = &self.list;
-        let place = |old: u32| match remaining(old) {
-            GONE => GONE,
-            old => list.new_index(old),
-        };
-        self.touching
-            .collect(&mut self.reach, &mut self.grains, self.layout, &place);
-        self.wall_contacts.take_down(place);
-        self.list_walls();
-        self.settle_loads();
-        self.renew_rows();
-        self.make_reach(true);
-        self.rebuilds += 1;
-    }
-
-    /// Makes room for what a step leaves for rows and fixed grains.
-    pub(crate) fn renew_rows(&mut self) {
-        self.fastest.clear();
-        self.fastest.resize(self.list.rows.len(), 0.0);
-        self.fixed.clear();
-        let grains = &self.grains;
-        let fixed = (0..grains.len()).filter(|&i| grains.is_fixed(i));
-        self.fixed.extend(fixed.map(|i| i as u32));
-        self.taken.clear();
-        self.taken.resize(self.fixed.len(), [0.0; 4]);
-    }
-
-    /// Makes the list of pairs within reach anew: in new chunks, with the histories in `touching`, or
-    /// in the same ones with the histories it has.
-    fn make_reach(&mut self, cut: bool) {
-        let making = Making {
-            grains: &self.grains,
-            list: &self.list,
-            images: Images::of(&self.cell()),
-            width: self.layout.history,
-            hold: self.hold,
-        };
-        if cut {
-            self.reach.cut(&making, &self.touching, self.parallel);
-            self.touching.close(&mut self.grains.spare);
-        } else {
-            self.reach.renew(&making);
-        }
-        self.current = false;
-    }
-
-    /// Takes up histories of touching contacts i < j, as a checkpoint has them.
-    pub(crate) fn take_histories(&mut self, pairs: &[[u32; 2]], histories: &[f64]) {
-        let (width, flips) = (self.layout.history, self.layout.flips);
-        self.touching
-            .open(width, self.grains.len(), &mut self.grains.spare);
-        for &[i, j] in pairs {
-            self.touching.count(i, j);
-        }
-        self.touching.lay();
-        for (&[i, j], history) in pairs.iter().zip(histories.chunks_exact(width)) {
-            self.touching.put(i, j, history, flips);
-        }
-        self.make_reach(true);
     }
 
     /// Adds what fixed grains have taken to the total, in their order.

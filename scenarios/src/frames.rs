@@ -83,13 +83,14 @@ impl Frames {
         self.directory.join(FOLDER).join(name)
     }
 
-    /// Joins all frames into one file a series and removes the single ones.
-    pub fn join(&self) -> Result<(), Failure> {
+    /// Joins all frames up to the last step `done` into one file a series and removes the single ones.
+    pub fn join(&self, done: u64) -> Result<(), Failure> {
         if self.count == 0 {
             return Ok(());
         }
         let mut steps: Vec<u64> = (0..=self.count).map(|frame| self.step_of(frame)).collect();
         steps.dedup();
+        steps.retain(|&step| step <= done);
         for series in SERIES {
             let paths = steps.iter().map(|&step| self.path(series, step));
             let series = self.directory.join(format!("{series}.vtkhdf"));

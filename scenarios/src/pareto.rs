@@ -87,6 +87,7 @@ impl Comparison {
                 scene.name,
                 match scene.body {
                     SceneBody::Incline(_) => "timestep.steps_per_contact=100",
+                    SceneBody::Grains(_) => "timestep.safety=0.3",
                     _ => "timestep=1e-5",
                 }
             )));

@@ -2,6 +2,7 @@
 
 mod bed;
 mod law;
+mod world;
 
 use crate::failure::Failure;
 use crate::run;
@@ -26,6 +27,7 @@ pub fn plan(scene: &Scene) -> Result<String, Failure> {
         SceneBody::Impact(body) => impact(scene, body),
         SceneBody::Chute(body) => bed::chute(body),
         SceneBody::Settle(body) => bed::settle(body),
+        SceneBody::Grains(kind) => world::plan(scene, kind.recipe()),
     }
 }
 

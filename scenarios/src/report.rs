@@ -1,6 +1,7 @@
 //! Reports: one self-contained HTML file from what a run directory holds.
 
 pub mod calibration;
+mod figures;
 pub mod page;
 pub mod plot;
 mod sections;
@@ -168,7 +169,9 @@ fn one_run(record: &Record) -> (String, String, Markup) {
             None => {
                 (remarks(summary))
                 (sections::plots(record))
+                (figures::figures(record))
                 (results(summary))
+                (figures::preparation(summary))
             }
         }
         (model(summary))

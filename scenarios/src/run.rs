@@ -5,12 +5,14 @@ pub mod bed;
 pub mod chute;
 pub mod energy_table;
 pub mod grain_table;
+mod grains;
 pub mod impact;
 pub mod impact_scales;
 pub mod incline;
 pub mod precheck;
 pub mod settle;
 pub mod step;
+pub mod world;
 
 use crate::checkpoint::{self, Checkpoint};
 use crate::failure::{Failure, Resumes};
@@ -192,6 +194,7 @@ pub fn check(scene: &Scene) -> Result<(), Failure> {
         SceneBody::Impact(body) => impact::check(scene, body),
         SceneBody::Chute(body) => chute::check(scene, body),
         SceneBody::Settle(body) => settle::check(scene, body),
+        SceneBody::Grains(kind) => world::course::check(scene, kind.recipe()),
     }
 }
 
@@ -231,6 +234,7 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> {
             SceneBody::Impact(body) => impact::run(body, &mut under),
             SceneBody::Chute(body) => chute::run(body, &mut under),
             SceneBody::Settle(body) => settle::run(body, &mut under),
+            SceneBody::Grains(kind) => world::course::run(kind.recipe(), &mut under),
         })
     });
     let (begun, wall_s, going_on) = (under.begun, under.wall_s(), under.resumed.is_some());

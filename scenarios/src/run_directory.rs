@@ -20,15 +20,18 @@ pub const REPORT: &str = "report.html";
 pub const RESULTS: &str = "results.h5";
 /// Name of the checkpoint.
 pub const CHECKPOINT: &str = "checkpoint.h5";
+/// Name of the packing that a run starts from.
+pub const PACKING: &str = "packing.h5";
 /// Name of the log.
 pub const LOG: &str = "log.txt";
 
 /// Every file that a run, a campaign or a comparison writes.
-const OWN_FILES: [&str; 20] = [
+const OWN_FILES: [&str; 21] = [
     SCENE,
     REPORT,
     RESULTS,
     CHECKPOINT,
+    PACKING,
     LOG,
     "grains.vtkhdf",
     "contacts.vtkhdf",
@@ -283,13 +286,17 @@ fn outermost_missing(path: &Path) -> Option<PathBuf> {
 /// Removes what an earlier run wrote, so that old tables do not pass for new ones. Files of other
 /// names stay.
 fn remove_old_run(path: &Path) -> std::io::Result<()> {
-    let profiles: Vec<String> = fs::read_dir(path)?
+    let numbered = |name: &String| {
+        (name.starts_with("profile_") && name.ends_with(".csv"))
+            || (name.starts_with("view_") && name.ends_with(".png"))
+    };
+    let numbered: Vec<String> = fs::read_dir(path)?
         .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
-        .filter(|name| name.starts_with("profile_") && name.ends_with(".csv"))
+        .filter(numbered)
         .collect();
     for name in OWN_FILES
         .into_iter()
-        .chain(profiles.iter().map(String::as_str))
+        .chain(numbered.iter().map(String::as_str))
     {
         match fs::remove_file(path.join(name)) {
             Err(error) if error.kind() != std::io::ErrorKind::NotFound => return Err(error),
@@ -299,7 +306,8 @@ fn remove_old_run(path: &Path) -> std::io::Result<()> {
     crate::frames::remove(path)
 }
 
-fn differing_keys(a: &toml::Table, b: &toml::Table, path: &str) -> Vec<String> {
+/// Dotted paths of keys that two tables do not agree on.
+pub fn differing_keys(a: &toml::Table, b: &toml::Table, path: &str) -> Vec<String> {
     let names: std::collections::BTreeSet<&String> = a.keys().chain(b.keys()).collect();
     let mut keys = Vec::new();
     for name in names {

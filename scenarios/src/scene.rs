@@ -10,23 +10,28 @@ mod check;
 mod chute;
 mod error;
 mod friction_keys;
+mod grains;
 mod impact;
 mod incline;
+mod kinds;
 mod law;
 mod law_layers;
 mod layer_case;
-mod layers;
+pub mod layers;
 mod settle;
+pub mod world;
 
 pub use bagnold::{BagnoldGrid, BagnoldScene, FrictionLaw, RheologyKeys, SolverKeys, SolverMethod};
 pub use bed::Pace;
 pub use chute::ChuteScene;
 pub use error::SceneError;
+pub use grains::GrainsScene;
 pub use impact::{ImpactScene, RollingKeys};
 pub use incline::{
     Bracket, CalibrationKeys, ContactKeys, FloorKeys, GrainKeys, GuessKeys, InclineScene,
     InclineStart, SizeLaw, TimeKeys, TimestepKeys,
 };
+pub use kinds::Kind;
 pub use law::{
     CohesionKind, LawKeys, LeverKind, MemoryKind, NormalKind, Parts, RollingKind, TangentialKind,
 };
@@ -38,7 +43,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// The names and texts of the bundled scenes.
-pub const BUNDLED: [(&str, &str); 8] = [
+pub const BUNDLED: [(&str, &str); 9] = [
     (
         "incline-moderate",
         include_str!("../scenes/incline-moderate.toml"),
@@ -59,6 +64,7 @@ pub const BUNDLED: [(&str, &str); 8] = [
     ),
     ("chute", include_str!("../scenes/chute.toml")),
     ("settle", include_str!("../scenes/settle.toml")),
+    ("grains", include_str!("../scenes/grains.toml")),
 ];
 
 /// The text of a bundled scene.
@@ -82,6 +88,8 @@ pub enum SceneBody {
     Chute(Box<ChuteScene>),
     /// Grains that settle in a box.
     Settle(Box<SettleScene>),
+    /// Grains with walls, bonds, gravity and a preparation.
+    Grains(Box<Kind>),
 }
 
 impl SceneBody {
@@ -93,6 +101,7 @@ impl SceneBody {
             SceneBody::Impact(scene) => toml::Table::try_from(scene),
             SceneBody::Chute(scene) => toml::Table::try_from(scene),
             SceneBody::Settle(scene) => toml::Table::try_from(scene),
+            SceneBody::Grains(kind) => kind.to_table(),
         }
         .unwrap_or_default()
     }
@@ -167,8 +176,7 @@ impl Scene {
         (settings, option): (&[String], &str),
     ) -> Result<Scene, SceneError> {
         let name = kind_of(&mut own, origin)?;
-        let text = bundled(&name).unwrap_or_default();
-        let mut base = layers::parse(text, &name)?;
+        let mut base = layers::parse(base_of(&name), &name)?;
         base.remove("scene");
         let schema = body_schema(&name);
 
@@ -181,13 +189,19 @@ impl Scene {
             _ => choices,
         };
         let impact = matches!(kind, Family::Impact);
-        let lawful = matches!(kind, Family::Impact | Family::Chute | Family::Settle);
+        let lawful = matches!(
+            kind,
+            Family::Impact | Family::Chute | Family::Settle | Family::Grains
+        );
         check::check(&own, &schema, origin)?;
         layers::check_choices(&own, choices, origin)?;
         if let Some(folder) = folder {
             layers::anchor_path(&mut own, "rheology.file", folder);
             if matches!(kind, Family::Chute | Family::Settle) {
                 layers::anchor_path(&mut own, "start", folder);
+            }
+            if matches!(kind, Family::Grains) {
+                kinds::anchor(&mut own, folder);
             }
         }
         // What was written, before a file's numbers take their places.
@@ -240,6 +254,9 @@ impl Scene {
         resolved.insert("scene".into(), toml::Value::String(name.clone()));
         resolved.extend(body.to_table());
         inputs.extend(body.start_file().map(PathBuf::from));
+        if let SceneBody::Grains(_) = &body {
+            inputs.extend(kinds::inputs(&resolved));
+        }
         let scene = Scene {
             name,
             body,
@@ -283,6 +300,7 @@ impl Scene {
             SceneBody::Impact(scene) => scene.check_together(origin),
             SceneBody::Chute(scene) => scene.check_together(origin),
             SceneBody::Settle(scene) => scene.check_together(origin),
+            SceneBody::Grains(kind) => kind.check_together(origin),
         }
     }
 }
@@ -327,6 +345,10 @@ fn body(name: &str, table: &toml::Table) -> Result<SceneBody, String> {
         Family::Impact => SceneBody::Impact(table.try_into().map_err(plain)?),
         Family::Chute => SceneBody::Chute(table.try_into().map_err(plain)?),
         Family::Settle => SceneBody::Settle(table.try_into().map_err(plain)?),
+        Family::Grains => match Kind::read(name, table) {
+            Some(kind) => SceneBody::Grains(Box::new(kind.map_err(plain)?)),
+            None => return Err(format!("no scene is called `{name}`")),
+        },
     })
 }
 
@@ -343,6 +365,16 @@ enum Family {
     Impact,
     Chute,
     Settle,
+    Grains,
+}
+
+/// What a scene of this kind builds on. A `grains` scene stands for itself: walls and grains of the
+/// bundled example are nobody's defaults.
+fn base_of(name: &str) -> &'static str {
+    match name {
+        "grains" => "",
+        _ => bundled(name).unwrap_or_default(),
+    }
 }
 
 fn family(name: &str) -> Family {
@@ -351,6 +383,7 @@ fn family(name: &str) -> Family {
         "two-spheres" | "sphere-on-plane" => Family::Impact,
         "chute" => Family::Chute,
         "settle" => Family::Settle,
+        _ if Kind::NAMES.contains(&name) => Family::Grains,
         _ => Family::Incline,
     }
 }
@@ -364,7 +397,7 @@ fn alternatives(name: &str) -> &'static [&'static [&'static str]] {
             "contact.stiffness_from_speed",
         ]],
         Family::Bagnold => rheology_file::ALTERNATIVES,
-        Family::Impact => &law::CHOICES,
+        Family::Impact | Family::Grains => &law::CHOICES,
         Family::Chute | Family::Settle => &BED_CHOICES,
     }
 }
@@ -385,6 +418,7 @@ fn body_schema(name: &str) -> Value {
         Family::Impact => schemars::schema_for!(ImpactScene),
         Family::Chute => schemars::schema_for!(ChuteScene),
         Family::Settle => schemars::schema_for!(SettleScene),
+        Family::Grains => return Kind::schema(name).unwrap_or_default(),
     };
     schema.to_value()
 }

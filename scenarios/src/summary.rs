@@ -47,6 +47,66 @@ pub struct Summary {
     /// Warnings and remarks in words.
     #[serde(default)]
     pub remarks: Vec<String>,
+    /// What was done to put grains in place, and how it went.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub preparation: Vec<Note>,
+    /// Curves and pictures for the report.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub figures: Vec<Figure>,
+}
+
+/// A step of a preparation.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Note {
+    /// What was done.
+    pub step: String,
+    /// What it achieved against what was asked for.
+    pub text: String,
+}
+
+/// A figure of the report.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+#[serde(tag = "kind", rename_all = "lowercase")]
+pub enum Figure {
+    /// Columns of a CSV table against one of them.
+    Curves {
+        /// Name of the table, without ending.
+        table: String,
+        /// Column along the horizontal axis, and its label.
+        x: [String; 2],
+        /// Label of the vertical axis.
+        y_label: String,
+        /// Columns, and what the legend calls them.
+        y: Vec<[String; 2]>,
+        /// Whether both axes are logarithmic.
+        #[serde(default)]
+        log: bool,
+        /// What is to be seen.
+        caption: String,
+    },
+    /// A picture in the run directory.
+    Picture {
+        /// Its file.
+        file: String,
+        /// What is to be seen.
+        caption: String,
+    },
+}
+
+impl Figure {
+    /// Columns of `history.csv` in time.
+    pub fn history(y_label: &str, y: &[(&str, &str)], caption: &str) -> Figure {
+        Figure::Curves {
+            table: "history".into(),
+            x: ["t".into(), "time t [s]".into()],
+            y_label: y_label.into(),
+            y: y.iter()
+                .map(|(column, label)| [(*column).to_owned(), (*label).to_owned()])
+                .collect(),
+            log: false,
+            caption: caption.into(),
+        }
+    }
 }
 
 /// What was modelled.
@@ -139,6 +199,8 @@ impl Summary {
             state_hash: String::new(),
             results: BTreeMap::new(),
             remarks: Vec::new(),
+            preparation: Vec::new(),
+            figures: Vec::new(),
         }
     }
 

@@ -22,6 +22,14 @@ pub fn errors(scene: &Scene, run: &Path, reference: &Path) -> Result<Errors, Fai
             }
             errors
         }
+        SceneBody::Grains(ref kind) => {
+            let names = kind.recipe().compared();
+            let error = |name: &str| Ok((name.to_owned(), result(run, reference, name)?));
+            names
+                .into_iter()
+                .map(error)
+                .collect::<Result<_, Failure>>()?
+        }
         SceneBody::Impact(_) => vec![(
             "restitution".to_owned(),
             result(run, reference, "restitution")?,
@@ -34,7 +42,11 @@ pub fn errors(scene: &Scene, run: &Path, reference: &Path) -> Result<Errors, Fai
 
 /// What the error is, in words.
 pub fn against_reference(scene: &Scene) -> String {
-    match scene.body {
+    match &scene.body {
+        SceneBody::Grains(kind) => format!(
+            "the reference run; largest relative error of {}",
+            kind.recipe().compared().join(", ")
+        ),
         SceneBody::Chute(_) | SceneBody::Settle(_) => {
             "the reference run; largest relative error of kinetic energy (L2 over the time of the run), height of the centre of mass, solid fraction and coordination at the end".to_owned()
         }

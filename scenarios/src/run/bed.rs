@@ -160,7 +160,7 @@ pub fn run(bed: &Bed, under: &mut Under) -> Result<Ran, Failure> {
         })?;
     }
     bar.clear();
-    frames.join()?;
+    frames.join(simulation.steps_done())?;
     simulation.snapshot(&mut snapshot);
     Ok(Ran {
         rows,

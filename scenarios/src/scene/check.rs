@@ -53,7 +53,7 @@ impl Checker<'_> {
         let properties = schema["properties"].as_object().unwrap_or(&empty);
         for (key, value) in table {
             let dotted = join(path, key);
-            let Some(property) = properties.get(key) else {
+            let Some(property) = properties.get(key).or_else(|| named(schema)) else {
                 return Err(SceneError::UnknownKey {
                     file: self.file.to_owned(),
                     nearest: nearest(key, properties.keys().map(String::as_str))
@@ -83,9 +83,21 @@ impl Checker<'_> {
             }
         }
         for (key, value) in table {
-            if let toml::Value::Table(inner) = value {
-                let definition = self.definition(&schema["properties"][key]);
-                self.required(inner, definition, &join(path, key))?;
+            let property = schema["properties"].get(key).or_else(|| named(schema));
+            let Some(definition) = property.map(|p| self.definition(p)) else {
+                continue;
+            };
+            match value {
+                toml::Value::Table(inner) => self.required(inner, definition, &join(path, key))?,
+                toml::Value::Array(items) => {
+                    let item = self.definition(&definition["items"]);
+                    for (n, inner) in items.iter().enumerate() {
+                        if let toml::Value::Table(inner) = inner {
+                            self.required(inner, item, &format!("{}[{n}]", join(path, key)))?;
+                        }
+                    }
+                }
+                _ => {}
             }
         }
         Ok(())
@@ -160,6 +172,11 @@ impl Checker<'_> {
             range: describe(schema),
         }
     }
+}
+
+/// The schema of sections with names of the user's own, as in `[walls.NAME]`.
+fn named(schema: &Value) -> Option<&Value> {
+    schema.get("additionalProperties").filter(|s| s.is_object())
 }
 
 fn join(path: &str, key: &str) -> String {

@@ -112,6 +112,16 @@ pub enum SceneError {
         /// The parts of the law, and the keys it reads.
         law: String,
     },
+    /// A key that a choice does not read.
+    #[error("{file}: key `{key}` is not read by {choice}; leave it out")]
+    Unneeded {
+        /// Where it was read.
+        file: String,
+        /// Dotted path.
+        key: String,
+        /// The choice that does not read it.
+        choice: String,
+    },
     /// A start file that cannot be used.
     #[error("key `start` = \"{path}\": {message}")]
     Start {

@@ -1,0 +1,217 @@
+//! A scene of grains of one's own.
+
+use super::world::steps::{self, Around};
+use super::world::workshop::Surroundings;
+use super::world::{Expected, Ran, Recipe, Workshop, World};
+use crate::failure::Failure;
+use crate::scene::world::{
+    Materials, OutputKeys, Place, PrepareKind, StepKeys, bond_rules, region, walls,
+};
+use crate::scene::{GrainsScene, LawKeys, layers};
+use crate::summary::{Figure, Quantity, Summary};
+use crate::table::Table;
+use colluvium_dem::preparation::{Packing, solid_fraction};
+use colluvium_dem::{BoxMotion, Region};
+use nalgebra::Vector3;
+
+impl GrainsScene {
+    fn around(&self, materials: &Materials, origin: &str) -> Result<Around, Failure> {
+        let mut walls = walls(&self.walls, materials, origin)?;
+        // Time begins when the grains are in place.
+        walls
+            .iter_mut()
+            .for_each(|wall| wall.motion = colluvium_dem::Motion::Fixed);
+        Ok(Around {
+            walls,
+            gravity: self.gravity.start(origin)?,
+        })
+    }
+}
+
+impl Recipe for GrainsScene {
+    fn about(&self) -> String {
+        format!("grains as the file says, for {} s", self.duration)
+    }
+
+    fn materials(&self, origin: &str) -> Result<Materials, Failure> {
+        Ok(GrainsScene::materials(self, origin)?)
+    }
+
+    fn contact(&self) -> &LawKeys {
+        &self.contact
+    }
+
+    fn seed(&self) -> u64 {
+        self.seed
+    }
+
+    fn coarse_graining(&self) -> f64 {
+        self.coarse_graining
+    }
+
+    fn step(&self) -> &StepKeys {
+        &self.timestep
+    }
+
+    fn output(&self) -> &OutputKeys {
+        &self.output
+    }
+
+    fn packing(&self) -> Option<&str> {
+        self.packing.as_deref()
+    }
+
+    /// All that decides a preparation; bonds, cracks and what happens afterwards do not.
+    fn provenance(&self) -> Option<toml::Table> {
+        if self.prepare.is_empty() {
+            return None;
+        }
+        let mut keys = toml::Table::try_from(self).unwrap_or_default();
+        for later in [
+            "duration", "packing", "velocity", "output", "bonds", "cracks",
+        ] {
+            keys.remove(later);
+        }
+        for step in ["seconds", "safety"] {
+            layers::remove(&mut keys, &format!("timestep.{step}"));
+        }
+        // Walls stand while grains are put in place.
+        for wall in self.walls.keys() {
+            layers::remove(&mut keys, &format!("walls.{wall}.motion"));
+        }
+        Some(keys)
+    }
+
+    fn prepare(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure> {
+        if let Some(boundaries) = &self.boundaries {
+            shop.packing.domain = boundaries.domain(origin)?;
+        }
+        let around = self.around(shop.materials, origin)?;
+        steps::prepare(shop, &self.prepare, &around, origin)?;
+        let all = Surroundings {
+            walls: around.walls.clone(),
+            gravity: around.gravity,
+            ..Surroundings::none(shop.materials.laws.clone())
+        };
+        let middle = shop.middle();
+        shop.measure(&all, &middle, around.acceleration()).map(drop)
+    }
+
+    fn world(
+        &self,
+        _packing: &Packing,
+        materials: &Materials,
+        origin: &str,
+    ) -> Result<World, Failure> {
+        let named = self.walls.keys().cloned();
+        let mut world = World {
+            gravity: self.gravity.start(origin)?,
+            schedule: self.gravity.schedule(origin)?,
+            sphere: self.gravity.sphere(),
+            own_gravity: self.gravity.own(),
+            walls: named.zip(walls(&self.walls, materials, origin)?).collect(),
+            bonds: bond_rules(&self.bonds, materials, origin)?,
+            velocity: self.velocity.map(Vector3::from),
+            ..World::empty(self.duration)
+        };
+        world.speed = self.velocity.map_or(0.0, |v| Vector3::from(v).norm());
+        for (name, crack) in &self.cracks {
+            let section = format!("cracks.{name}.within");
+            let at = Place {
+                origin,
+                section: &section,
+            };
+            world.cracks.push(region(&crack.within, at)?);
+        }
+        if let Some(boundaries) = &self.boundaries {
+            // A jammed packing brings a box of its own.
+            let jams = self.prepare.iter().any(|s| s.r#do == PrepareKind::Jam);
+            world.domain = (!jams).then_some(boundaries.domain(origin)?);
+            world.box_motion = boundaries.motion(origin)?;
+            world.outlet = boundaries.outlet(origin)?;
+        }
+        Ok(world)
+    }
+
+    fn expected(&self, materials: &Materials) -> Expected {
+        let mean = &materials.ingredients[0].sizes;
+        let volume = 4.0 / 3.0 * std::f64::consts::PI * mean.mean().powi(3);
+        let counts = self.prepare.iter().map(|step| match step.count {
+            Some(count) => count as f64,
+            None => step.mass.map_or(f64::NAN, |m| {
+                m / (materials.ingredients[0].density * volume)
+            }),
+        });
+        let known: f64 = counts.filter(|n| n.is_finite()).sum();
+        Expected {
+            grains: known,
+            preparation: None,
+            duration: self.duration,
+        }
+    }
+
+    fn left_out(&self) -> Vec<&'static str> {
+        let mut list = vec!["air", "breakage of grains"];
+        let g = &self.gravity;
+        if g.uniform == [0.0; 3] && g.schedule.is_none() && g.file.is_none() && g.sphere.is_none() {
+            list.push("gravity from outside");
+        }
+        if g.own.is_none() {
+            list.push("attraction of the grains by each other");
+        }
+        list
+    }
+
+    fn shows_clusters(&self) -> bool {
+        !self.bonds.is_empty()
+    }
+
+    fn conclude(&self, ran: &mut Ran, summary: &mut Summary) -> Result<Vec<Table>, Failure> {
+        let last = |name: &str| ran.history.column(name).last().copied().unwrap_or(f64::NAN);
+        let kinetic = last("translation") + last("rotation");
+        summary.put(
+            "kinetic_energy",
+            Quantity::new(kinetic, "J").from("at the end, translation and rotation"),
+        );
+        for axis in ["x", "y", "z"] {
+            let name = format!("centre_of_mass_{axis}");
+            let place = Quantity::new(last(axis), "m").from("of the free grains at the end");
+            summary.put(&name, place);
+        }
+        let domain = *ran.simulation.domain();
+        if domain.periodic == [true; 3] && self.boundaries.as_ref().is_none_or(moves_not) {
+            let grains = ran.simulation.grain_list();
+            let solid = solid_fraction(&grains, &domain, &Region::Everywhere);
+            summary.put(
+                "solid_fraction",
+                Quantity::new(solid, "1").from("of the box at the end"),
+            );
+        }
+        summary.figures.push(Figure::history(
+            "energy [J]",
+            &[
+                ("translation", "translation"),
+                ("rotation", "rotation"),
+                ("elastic", "elastic"),
+            ],
+            "Energies of the grains in time.",
+        ));
+        if !self.bonds.is_empty() {
+            let columns = [("bonds", "whole"), ("broken_bonds", "broken")];
+            let figure =
+                Figure::history("bonds", &columns, "Bonds that hold, and that have broken.");
+            summary.figures.push(figure);
+        }
+        Ok(Vec::new())
+    }
+
+    fn compared(&self) -> Vec<&'static str> {
+        vec!["kinetic_energy", "coordination", "centre_of_mass_z"]
+    }
+}
+
+fn moves_not(boundaries: &crate::scene::world::BoundaryKeys) -> bool {
+    boundaries
+        .motion("")
+        .is_ok_and(|motion| motion == BoxMotion::Rest)
+}

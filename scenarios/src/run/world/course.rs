@@ -1,0 +1,339 @@
+//! A run from its packing to its end.
+
+use super::build::Stand;
+use super::history::History;
+use super::packing_file::{self, Stored};
+use super::pictures::Pictures;
+use super::recipe::{Course, Recipe};
+use super::store;
+use super::workshop::{Workshop, stand_ins};
+use crate::cost::Cost;
+use crate::failure::Failure;
+use crate::frames::Frames;
+use crate::progress::Bar;
+use crate::run::{Findings, Under, bed, grain_table, step};
+use crate::run_directory;
+use crate::scene::Scene;
+use crate::scene::world::Materials;
+use crate::summary::{Model, Quantity, Summary};
+use crate::table::Table;
+use colluvium_dem::preparation::{Coordination, HELD_BY_FRICTION, Packing, RestMeasures};
+use colluvium_dem::{Record, SetupError, Simulation, Snapshot, Threads};
+use std::ops::ControlFlow;
+use std::time::Instant;
+
+/// Steps between two looks at the clock.
+const STEPS_PER_LOOK: u64 = 100;
+
+/// Name of the recipe's memory in a checkpoint.
+const STATE: &str = "recipe/state";
+
+/// A run that has come to its end.
+#[derive(Debug)]
+pub struct Ran {
+    /// The packing that it began with.
+    pub packing: Packing,
+    /// What it was made from.
+    pub stand: Stand,
+    /// The state at the end.
+    pub simulation: Simulation,
+    /// Grains, contacts and bonds at the end.
+    pub seen: Snapshot,
+    /// Rows of `history.csv`.
+    pub history: Table,
+    /// The recipe's memory.
+    pub state: Vec<f64>,
+}
+
+/// Checks a scene before anything is written: keys, files, laws, walls, bonds and the step, on the smallest
+/// and the largest grain of each kind.
+pub fn check(scene: &Scene, recipe: &dyn Recipe) -> Result<(), Failure> {
+    let origin = &scene.origin;
+    let materials = recipe.materials(origin)?;
+    let found = store::find(recipe, &materials, origin)?;
+    let packing = found.map_or_else(|| trial(&materials), |stored| stored.packing);
+    let stand = Stand::new(recipe, &packing, &materials, Threads::Serial, origin)?;
+    let trial = stand.start();
+    trial
+        .map(drop)
+        .map_err(|error| Failure::Input(format!("{origin}: {error}")))
+}
+
+/// The smallest and the largest grain of each kind, far enough from each other.
+pub fn trial(materials: &Materials) -> Packing {
+    let mut grains = stand_ins(materials);
+    let mut at = 0.0;
+    for grain in &mut grains {
+        at += 2.0 * grain.radius;
+        grain.position.x = at;
+        at += 2.0 * grain.radius;
+    }
+    Packing {
+        domain: super::workshop::open_space(),
+        grains,
+        contacts: Vec::new(),
+    }
+}
+
+/// The packing of a run: of this run before it was stopped, stored, or made now.
+fn packing(
+    recipe: &dyn Recipe,
+    materials: &Materials,
+    under: &mut Under,
+) -> Result<(Stored, bool), Failure> {
+    let own = under.directory.file(run_directory::PACKING);
+    if own.exists() {
+        let stored = packing_file::read(&own).map_err(|why| {
+            Failure::Input(format!(
+                "--resume: {} cannot be used: {why}; nothing was changed",
+                own.display()
+            ))
+        })?;
+        return Ok((stored, true));
+    }
+    if let Some(stored) = store::find(recipe, materials, &under.scene.origin)? {
+        under.begin()?;
+        under.directory.journal.note("starts from a stored packing");
+        packing_file::write(&own, &under.scene.name, &stored)?;
+        return Ok((stored, false));
+    }
+    under.begin()?;
+    let stored = make(recipe, materials, under)?;
+    packing_file::write(&own, &under.scene.name, &stored)?;
+    if let Some(path) = store::keep(recipe, &under.scene.name, &stored)? {
+        let kept = format!("packing kept as {}", path.display());
+        under.directory.journal.note(&kept);
+    }
+    Ok((stored, false))
+}
+
+fn make(recipe: &dyn Recipe, materials: &Materials, under: &Under) -> Result<Stored, Failure> {
+    let bar = Bar::new("preparation");
+    let mut watch = |rest: &RestMeasures| {
+        bar.say(&rest.to_string());
+        if crate::interruption::requested() {
+            return ControlFlow::Break(());
+        }
+        ControlFlow::Continue(())
+    };
+    let seed = recipe.seed();
+    let keys = (seed, recipe.step().preparation);
+    let threads = under.threads_of_one_run();
+    let mut shop = Workshop::new(materials, keys, threads, &mut watch);
+    let made = recipe.prepare(&mut shop, &under.scene.origin);
+    let (packing, notes, grain_steps) = (shop.packing, shop.notes, shop.grain_steps);
+    bar.clear();
+    if crate::interruption::requested() {
+        return Err(under.interrupted());
+    }
+    made?;
+    for note in &notes {
+        let line = format!("{}: {}", note.step, note.text.replace('\n', "; "));
+        under.directory.journal.note(&line);
+    }
+    Ok(Stored {
+        packing,
+        materials: materials.names.clone(),
+        provenance: recipe.provenance().unwrap_or_default(),
+        notes,
+        grain_steps,
+    })
+}
+
+/// Runs a scene of grains.
+pub fn run(recipe: &dyn Recipe, under: &mut Under) -> Result<Findings, Failure> {
+    let origin = under.scene.origin.clone();
+    let materials = recipe.materials(&origin)?;
+    let (stored, again) = packing(recipe, &materials, under)?;
+    let threads = under.threads_of_one_run();
+    let stand = Stand::new(recipe, &stored.packing, &materials, threads, &origin)?;
+    let refused = |error: SetupError| Failure::Input(format!("{origin}: {error}"));
+    let mut history = History::new(&stand.world, recipe);
+    let mut state = Vec::new();
+    let mut simulation = match &under.resumed {
+        Some(saved) => {
+            let damaged =
+                |why: String| Failure::Input(format!("--resume: the checkpoint is damaged: {why}"));
+            history.restore(&saved.record).map_err(damaged)?;
+            state = saved.record.numbers(STATE).map_err(damaged)?.to_vec();
+            stand.resume(&saved.record).map_err(refused)?
+        }
+        None => {
+            let mut simulation = stand.start().map_err(refused)?;
+            if recipe.output().ledger {
+                simulation.open_energy_ledger();
+            }
+            simulation
+        }
+    };
+    if again {
+        under.begin()?;
+    }
+    let clock = Instant::now();
+    let pictures = Pictures::new(recipe, &materials, under.directory);
+    follow(
+        Followed {
+            recipe,
+            stand: &stand,
+            simulation: &mut simulation,
+            history: &mut history,
+            state: &mut state,
+            pictures: &pictures,
+        },
+        under,
+    )?;
+    let mut seen = Snapshot::default();
+    simulation.snapshot(&mut seen);
+    let mut ran = Ran {
+        packing: stored.packing.clone(),
+        stand,
+        simulation,
+        seen,
+        history: history.table(),
+        state,
+    };
+    let seconds = clock.elapsed().as_secs_f64();
+    let note = format!("{} steps in {seconds:.1} s", ran.simulation.steps_done());
+    under.directory.journal.note(&note);
+    findings(recipe, (&stored, &mut ran), &pictures, under)
+}
+
+/// What a run takes along from step to step.
+struct Followed<'a> {
+    recipe: &'a dyn Recipe,
+    stand: &'a Stand,
+    simulation: &'a mut Simulation,
+    history: &'a mut History,
+    state: &'a mut Vec<f64>,
+    pictures: &'a Pictures<'a>,
+}
+
+/// Follows the simulation to its end.
+fn follow(run: Followed, under: &mut Under) -> Result<(), Failure> {
+    let Followed {
+        recipe,
+        stand,
+        simulation,
+        history,
+        state,
+        pictures,
+    } = run;
+    let steps = stand.steps;
+    let row_every = (steps / recipe.output().rows).max(1);
+    let steer_every = recipe.steer_every(stand.setup.timestep).max(1);
+    let bar = Bar::new(&under.scene.name);
+    let mut seen = Snapshot::default();
+    let frames = Frames::new(under.directory.path(), steps, recipe.output().frames);
+    let mut course = Course::On;
+    if simulation.steps_done() == 0 {
+        course = recipe.steer(simulation, state)?;
+        history.look(recipe, simulation, &mut seen, state);
+        frames.take(simulation, &mut seen)?;
+        pictures.take(simulation, 0, steps)?;
+    }
+    while simulation.steps_done() < steps && course == Course::On {
+        let done = simulation.steps_done();
+        let after = |every: u64| (done / every).saturating_add(1).saturating_mul(every);
+        let mut next = after(row_every).min(after(steer_every)).min(steps);
+        next = next.min(done + STEPS_PER_LOOK);
+        next = frames.next(done).map_or(next, |frame| frame.min(next));
+        next = next.min(pictures.next(done, steps));
+        simulation
+            .advance(next - done)
+            .map_err(|error| Failure::Run(error.to_string()))?;
+        if next.is_multiple_of(steer_every) {
+            course = recipe.steer(simulation, state)?;
+        }
+        if next.is_multiple_of(row_every) || next == steps || course == Course::Over {
+            history.look(recipe, simulation, &mut seen, state);
+        }
+        frames.take(simulation, &mut seen)?;
+        pictures.take(simulation, next, steps)?;
+        bar.set(next as f64 / steps as f64);
+        if course == Course::On {
+            under.checkpoint("steps", || saved(simulation, history, state))?;
+        }
+    }
+    bar.clear();
+    let done = simulation.steps_done();
+    pictures.last(simulation, done)?;
+    frames.join(done)
+}
+
+fn saved(simulation: &mut Simulation, history: &History, state: &[f64]) -> Record {
+    let mut record = simulation.checkpoint();
+    history.save(&mut record);
+    record.numbers.insert(STATE.into(), state.to_vec());
+    record
+}
+
+fn findings(
+    recipe: &dyn Recipe,
+    (stored, ran): (&Stored, &mut Ran),
+    pictures: &Pictures,
+    under: &Under,
+) -> Result<Findings, Failure> {
+    let mut summary = Summary::begun(&under.scene.name, "run");
+    let grains = ran.packing.grains.len() as u64;
+    let (taken, choice) = (ran.stand.setup.timestep, &ran.stand.choice);
+    summary.model = Model {
+        grains,
+        cells: 0,
+        dt_s: taken,
+        dt_limit: match recipe.step().seconds {
+            Some(_) => step::given(taken, choice),
+            None => step::chosen(choice),
+        },
+        left_out: left_out(recipe, &ran.stand),
+    };
+    let steps = ran.simulation.steps_done() * grains + stored.grain_steps;
+    summary.cost = Cost::measured(under.wall_s(), under.threads, steps, 0);
+    summary.state_hash = ran.simulation.state_hash();
+    summary.ledger.momentum_relative = Some(ran.simulation.momentum_error());
+    let energy = ran.simulation.energy();
+    for (name, value) in [
+        ("translation_J", energy.translation),
+        ("rotation_J", energy.rotation),
+        ("elastic_J", energy.elastic()),
+    ] {
+        summary.ledger.energy.insert(name.into(), value);
+    }
+    let coordination = Coordination::of(&ran.seen, HELD_BY_FRICTION);
+    summary.put(
+        "coordination",
+        Quantity::new(coordination.all, "1").from("contacts of a free grain at the end"),
+    );
+    summary.put(
+        "largest_overlap",
+        Quantity::new(ran.simulation.largest_overlap(), "R"),
+    );
+    let bonds = ran.simulation.bond_count();
+    if bonds.whole + bonds.torn + bonds.sheared + bonds.cut > 0 {
+        summary.put(
+            "bonds",
+            Quantity::new(bonds.whole as f64, "1").from("whole at the end"),
+        );
+        summary.put(
+            "broken_bond_share",
+            Quantity::new(bonds.broken_share(), "1").from("of the bonds at the start"),
+        );
+    }
+    summary.preparation.clone_from(&stored.notes);
+    let mut tables = vec![ran.history.clone()];
+    tables.extend(recipe.conclude(ran, &mut summary)?);
+    summary.figures.extend(pictures.figures());
+    Ok(Findings {
+        summary,
+        tables,
+        grains: Some(grain_table::of(&ran.seen)),
+    })
+}
+
+/// What the scene leaves out: its own, and what its law and its world do not have.
+pub fn left_out(recipe: &dyn Recipe, stand: &Stand) -> Vec<String> {
+    let mut own = bed::left_out(recipe.contact().parts(), &recipe.left_out());
+    if stand.world.bonds.is_empty() {
+        own.push("bonds".into());
+    }
+    own
+}

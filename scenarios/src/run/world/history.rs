@@ -1,0 +1,165 @@
+//! Rows of `history.csv`: the whole of the grains in time, the mean force on each wall since the row before,
+//! what the scene's own recipe looks at.
+
+use super::build::World;
+use super::recipe::Recipe;
+use crate::table::Table;
+use colluvium_dem::{Record, Simulation, Snapshot};
+use nalgebra::Vector3;
+
+/// Columns of every scene.
+const STATE: [(&str, &str); 16] = [
+    ("t", "s"),
+    ("step", "1"),
+    ("grains", "1"),
+    ("translation", "J"),
+    ("rotation", "J"),
+    ("elastic", "J"),
+    ("x", "m"),
+    ("y", "m"),
+    ("z", "m"),
+    ("vx", "m/s"),
+    ("vy", "m/s"),
+    ("vz", "m/s"),
+    ("contacts", "1"),
+    ("largest_overlap", "R"),
+    ("bonds", "1"),
+    ("broken_bonds", "1"),
+];
+
+/// Columns of the ledger.
+const LEDGER: [(&str, &str); 5] = [
+    ("normal_loss", "J"),
+    ("tangential_loss", "J"),
+    ("rolling_loss", "J"),
+    ("twisting_loss", "J"),
+    ("ledger_error", "1"),
+];
+
+/// Name of the rows in a checkpoint.
+const SAVED: &str = "history/rows";
+
+/// The rows so far.
+#[derive(Clone, Debug)]
+pub struct History {
+    columns: Vec<(String, &'static str)>,
+    walls: usize,
+    ledger: bool,
+    rows: Vec<Vec<f64>>,
+}
+
+impl History {
+    /// No rows yet.
+    pub fn new(world: &World, recipe: &dyn Recipe) -> History {
+        let ledger = recipe.output().ledger;
+        let named = |list: &[(&str, &'static str)]| -> Vec<(String, &'static str)> {
+            list.iter().map(|(n, u)| ((*n).to_owned(), *u)).collect()
+        };
+        let mut columns = named(&STATE);
+        if ledger {
+            columns.extend(named(&LEDGER));
+        }
+        for (name, _) in &world.walls {
+            columns.extend(["fx", "fy", "fz"].map(|axis| (format!("{name}_{axis}"), "N")));
+        }
+        columns.extend(recipe.columns());
+        History {
+            columns,
+            walls: world.walls.len(),
+            ledger,
+            rows: Vec::new(),
+        }
+    }
+
+    /// The rows of a checkpoint.
+    pub fn restore(&mut self, record: &Record) -> Result<(), String> {
+        let (flat, width) = (record.numbers(SAVED)?, self.columns.len());
+        if !flat.len().is_multiple_of(width) {
+            return Err(format!("array `{SAVED}` must have rows of {width} numbers"));
+        }
+        self.rows = flat.chunks(width).map(<[f64]>::to_vec).collect();
+        Ok(())
+    }
+
+    /// Adds the rows to a checkpoint.
+    pub fn save(&self, record: &mut Record) {
+        let flat = self.rows.iter().flatten().copied().collect();
+        record.numbers.insert(SAVED.into(), flat);
+    }
+
+    /// Adds the row of this instant; forces on walls are means since the row before.
+    pub fn look(
+        &mut self,
+        recipe: &dyn Recipe,
+        simulation: &mut Simulation,
+        seen: &mut Snapshot,
+        state: &[f64],
+    ) {
+        simulation.snapshot(seen);
+        let energy = simulation.energy();
+        let bonds = simulation.bond_count();
+        let mut mass = 0.0;
+        let (mut place, mut velocity) = (Vector3::zeros(), Vector3::zeros());
+        for grain in seen.grains.iter().filter(|g| !g.fixed) {
+            mass += grain.mass;
+            place += grain.mass * grain.position;
+            velocity += grain.mass * grain.velocity;
+        }
+        if mass > 0.0 {
+            (place, velocity) = (place / mass, velocity / mass);
+        }
+        let mut row = vec![
+            simulation.time(),
+            simulation.steps_done() as f64,
+            seen.grains.len() as f64,
+            energy.translation,
+            energy.rotation,
+            energy.elastic(),
+            place.x,
+            place.y,
+            place.z,
+            velocity.x,
+            velocity.y,
+            velocity.z,
+            seen.contacts.len() as f64,
+            simulation.largest_overlap(),
+            bonds.whole as f64,
+            (bonds.torn + bonds.sheared) as f64,
+        ];
+        if self.ledger {
+            let booked = simulation.energy_ledger().map_or([f64::NAN; 5], |ledger| {
+                let lost = ledger.dissipated();
+                [
+                    lost.normal,
+                    lost.tangential,
+                    lost.rolling,
+                    lost.twisting,
+                    ledger.error(),
+                ]
+            });
+            // A channel that nothing went through is 0, not -0.
+            row.extend(booked.map(|x| x + 0.0));
+        }
+        for wall in 0..self.walls {
+            let taken = simulation.wall_taken(wall);
+            let mean = if taken.duration > 0.0 {
+                taken.impulse / taken.duration
+            } else {
+                simulation.wall_load(wall).force
+            };
+            simulation.forget_wall_taken(wall);
+            row.extend(mean.iter().map(|f| f + 0.0));
+        }
+        row.extend(recipe.look(simulation, seen, state));
+        self.rows.push(row);
+    }
+
+    /// The table.
+    pub fn table(&self) -> Table {
+        let columns = self.columns.iter().enumerate();
+        columns.fold(Table::new("history"), |table, (n, (name, unit))| {
+            let value = |row: &Vec<f64>| row.get(n).copied().unwrap_or(f64::NAN);
+            table.with(name, unit, self.rows.iter().map(value).collect())
+        })
+    }
+}

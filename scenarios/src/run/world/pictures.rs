@@ -1,0 +1,405 @@
+//! Pictures of the grains in the run directory, `view_*.png`: balls in a parallel projection.
+
+use super::recipe::Recipe;
+use crate::failure::Failure;
+use crate::run_directory::RunDirectory;
+use crate::scene::world::Materials;
+use crate::summary::Figure;
+use colluvium_dem::{Shape, Simulation};
+use nalgebra::Vector3;
+
+/// Pixels along the longer edge.
+const SIZE: f64 = 720.0;
+/// Margin around the grains, over the longer edge.
+const MARGIN: f64 = 0.04;
+
+/// Colours of kinds and clusters, apart for the colour-blind (after Okabe & Ito).
+const PALETTE: [[u8; 3]; 8] = [
+    [0x4b, 0xa5, 0xd8],
+    [0xd9, 0x5f, 0x1e],
+    [0x12, 0x96, 0x6f],
+    [0xe3, 0xb5, 0x05],
+    [0xb8, 0x56, 0x9a],
+    [0x1f, 0x7a, 0xc4],
+    [0x8c, 0x56, 0x4b],
+    [0x60, 0x60, 0x80],
+];
+/// Colour of grains without a cluster, and of fixed ones.
+const PLAIN: [u8; 3] = [0xb4, 0xb4, 0xb4];
+/// What lies behind, and within a plane that is seen from its side.
+const PAPER: [u8; 3] = [0xff, 0xff, 0xff];
+const GROUND: [u8; 3] = [0xe4, 0xdf, 0xd4];
+/// Colours of rising speed (after viridis).
+const SPEEDS: [[f64; 3]; 5] = [
+    [68.0, 1.0, 84.0],
+    [59.0, 82.0, 139.0],
+    [33.0, 145.0, 140.0],
+    [94.0, 201.0, 98.0],
+    [253.0, 231.0, 37.0],
+];
+
+/// What colours mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+enum Colouring {
+    Kinds,
+    Speeds,
+    Clusters,
+}
+
+impl Colouring {
+    fn word(self) -> &'static str {
+        match self {
+            Colouring::Kinds => "kinds",
+            Colouring::Speeds => "speeds",
+            Colouring::Clusters => "clusters",
+        }
+    }
+}
+
+/// The pictures of a run.
+#[derive(Debug)]
+pub struct Pictures<'a> {
+    view: [Vector3<f64>; 2],
+    clusters: bool,
+    kinds: &'a [String],
+    between: u64,
+    directory: &'a RunDirectory,
+}
+
+/// A ball to be drawn: place in the picture (m), depth (m), radius (m), colour.
+struct Ball {
+    at: [f64; 2],
+    depth: f64,
+    radius: f64,
+    colour: [u8; 3],
+}
+
+impl<'a> Pictures<'a> {
+    /// Pictures of a recipe's run.
+    pub fn new(
+        recipe: &dyn Recipe,
+        materials: &'a Materials,
+        directory: &'a RunDirectory,
+    ) -> Pictures<'a> {
+        Pictures {
+            view: recipe.view(),
+            clusters: recipe.shows_clusters(),
+            kinds: &materials.names,
+            between: recipe.output().pictures,
+            directory,
+        }
+    }
+
+    /// The first step after `done` at which a picture is taken.
+    pub fn next(&self, done: u64, steps: u64) -> u64 {
+        let parts = self.between + 1;
+        let step = |k: u64| (u128::from(k) * u128::from(steps) / u128::from(parts)) as u64;
+        (1..=self.between)
+            .map(step)
+            .find(|&s| s > done)
+            .unwrap_or(u64::MAX)
+    }
+
+    /// Takes a picture where one is due at this step.
+    pub fn take(&self, simulation: &mut Simulation, step: u64, steps: u64) -> Result<(), Failure> {
+        if step == 0 {
+            let first = if self.kinds.len() > 1 {
+                Colouring::Kinds
+            } else {
+                Colouring::Speeds
+            };
+            return self.draw(simulation, first);
+        }
+        if step < steps && self.next(step - 1, steps) == step {
+            self.draw(simulation, Colouring::Speeds)?;
+        }
+        Ok(())
+    }
+
+    /// Takes the pictures of the end.
+    pub fn last(&self, simulation: &mut Simulation, step: u64) -> Result<(), Failure> {
+        if step > 0 {
+            self.draw(simulation, Colouring::Speeds)?;
+        }
+        if self.clusters {
+            self.draw(simulation, Colouring::Clusters)?;
+        }
+        Ok(())
+    }
+
+    fn draw(&self, simulation: &mut Simulation, colouring: Colouring) -> Result<(), Failure> {
+        let [away, up] = self.view;
+        let right = away.cross(&up);
+        let grains = simulation.grain_list();
+        if grains.is_empty() {
+            return Ok(());
+        }
+        let fastest = fastest(
+            grains
+                .iter()
+                .filter(|g| !g.fixed)
+                .map(|g| g.velocity.norm()),
+        );
+        let boulders = match colouring {
+            Colouring::Clusters => boulders(simulation),
+            _ => Vec::new(),
+        };
+        let colour = |k: usize, grain: &colluvium_dem::Grain| match colouring {
+            _ if grain.fixed => PLAIN,
+            Colouring::Kinds => PALETTE[usize::from(grain.material) % PALETTE.len()],
+            Colouring::Speeds => {
+                speed_colour(grain.velocity.norm() / fastest.max(f64::MIN_POSITIVE))
+            }
+            Colouring::Clusters => match boulders.get(k).copied().flatten() {
+                Some(rank) => PALETTE[rank % PALETTE.len()],
+                None => PLAIN,
+            },
+        };
+        let balls: Vec<Ball> = grains
+            .iter()
+            .enumerate()
+            .map(|(k, grain)| Ball {
+                at: [grain.position.dot(&right), grain.position.dot(&up)],
+                depth: grain.position.dot(&away),
+                radius: grain.radius,
+                colour: colour(k, grain),
+            })
+            .collect();
+        let grounds = self.grounds(simulation, [right, up]);
+        let (pixels, size) = paint(&balls, &grounds);
+        let text = match colouring {
+            Colouring::Kinds => self
+                .kinds
+                .iter()
+                .enumerate()
+                .map(|(k, name)| format!("{name}: {}", NAMES[k % NAMES.len()]))
+                .collect::<Vec<_>>()
+                .join(", "),
+            Colouring::Speeds => format!("speed from 0 (violet) to {fastest:.3e} m/s (yellow)"),
+            Colouring::Clusters => "clusters held together by bonds, single grains grey".to_owned(),
+        };
+        let caption = format!("t = {:.4e} s; {text}", simulation.time());
+        let name = format!(
+            "view_{:012}_{}.png",
+            simulation.steps_done(),
+            colouring.word()
+        );
+        let bytes = encode(&pixels, size, &caption)
+            .map_err(|error| Failure::Run(format!("cannot make the picture {name}: {error}")))?;
+        self.directory.write(&name, &bytes)
+    }
+
+    /// Planes that are seen from their sides: a point and the normal, in the picture (m).
+    fn grounds(&self, simulation: &Simulation, axes: [Vector3<f64>; 2]) -> Vec<[[f64; 2]; 2]> {
+        let walls = 0..simulation.wall_count();
+        let seen = walls.filter_map(|k| {
+            let (shape, pose) = (&simulation.wall(k).shape, simulation.wall_pose(k));
+            let Shape::Plane(plane) = shape else {
+                return None;
+            };
+            let normal = pose.outward(&plane.normal);
+            let flat = |v: &Vector3<f64>| [v.dot(&axes[0]), v.dot(&axes[1])];
+            (normal.dot(&self.view[0]).abs() < 1e-9).then(|| [flat(&pose.position), flat(&normal)])
+        });
+        seen.collect()
+    }
+
+    /// All pictures that were taken, as figures of the report.
+    pub fn figures(&self) -> Vec<Figure> {
+        let entries = std::fs::read_dir(self.directory.path())
+            .into_iter()
+            .flatten();
+        let mut files: Vec<String> = entries
+            .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
+            .filter(|name| name.starts_with("view_") && name.ends_with(".png"))
+            .collect();
+        files.sort();
+        let figure = |file: String| {
+            let bytes = std::fs::read(self.directory.file(&file)).unwrap_or_default();
+            Figure::Picture {
+                caption: caption(&bytes).unwrap_or_default(),
+                file,
+            }
+        };
+        files.into_iter().map(figure).collect()
+    }
+}
+
+/// What the palette's colours are called.
+const NAMES: [&str; 8] = [
+    "light blue",
+    "orange",
+    "green",
+    "yellow",
+    "pink",
+    "blue",
+    "brown",
+    "slate",
+];
+
+/// A speed that all but one grain in fifty stay below (m/s).
+fn fastest(speeds: impl Iterator<Item = f64>) -> f64 {
+    let mut speeds: Vec<f64> = speeds.collect();
+    speeds.sort_by(f64::total_cmp);
+    let at = (speeds.len() * 49 / 50).min(speeds.len().saturating_sub(1));
+    speeds.get(at).copied().unwrap_or(0.0)
+}
+
+fn speed_colour(share: f64) -> [u8; 3] {
+    let at = share.clamp(0.0, 1.0) * (SPEEDS.len() - 1) as f64;
+    let low = (at as usize).min(SPEEDS.len() - 2);
+    let part = at - low as f64;
+    std::array::from_fn(|c| (SPEEDS[low][c] + part * (SPEEDS[low + 1][c] - SPEEDS[low][c])) as u8)
+}
+
+/// For each grain in the order of numbers, the rank of its cluster by mass, if it has partners.
+fn boulders(simulation: &mut Simulation) -> Vec<Option<usize>> {
+    let clusters = simulation.clusters();
+    let mut seen = colluvium_dem::Snapshot::default();
+    simulation.snapshot(&mut seen);
+    let mut order: Vec<usize> = (0..seen.grains.len()).collect();
+    order.sort_by_key(|&i| seen.grains[i].id);
+    let rank = |i: usize| {
+        let cluster = clusters.of[i];
+        (clusters.list[cluster].grains > 1).then_some(cluster)
+    };
+    order.into_iter().map(rank).collect()
+}
+
+/// Pixels as rows of RGB from the top, and their numbers along both edges.
+fn paint(balls: &[Ball], grounds: &[[[f64; 2]; 2]]) -> (Vec<u8>, [usize; 2]) {
+    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
+    for ball in balls {
+        for k in 0..2 {
+            low[k] = low[k].min(ball.at[k] - ball.radius);
+            high[k] = high[k].max(ball.at[k] + ball.radius);
+        }
+    }
+    let longer = (high[0] - low[0]).max(high[1] - low[1]);
+    let margin = MARGIN * longer;
+    let scale = SIZE / (longer + 2.0 * margin);
+    let size: [usize; 2] = std::array::from_fn(|k| {
+        ((high[k] - low[k] + 2.0 * margin) * scale).ceil().max(1.0) as usize
+    });
+    let place = |column: usize, row: usize| {
+        [
+            low[0] - margin + (column as f64 + 0.5) / scale,
+            high[1] + margin - (row as f64 + 0.5) / scale,
+        ]
+    };
+    let mut pixels = Vec::with_capacity(3 * size[0] * size[1]);
+    for row in 0..size[1] {
+        for column in 0..size[0] {
+            let x = place(column, row);
+            let below = |[p, n]: &[[f64; 2]; 2]| (x[0] - p[0]) * n[0] + (x[1] - p[1]) * n[1] < 0.0;
+            pixels.extend(if grounds.iter().any(below) {
+                GROUND
+            } else {
+                PAPER
+            });
+        }
+    }
+    let mut nearest = vec![f64::INFINITY; size[0] * size[1]];
+    for ball in balls {
+        let column = |x: f64| (x - low[0] + margin) * scale - 0.5;
+        let row = |y: f64| (high[1] + margin - y) * scale - 0.5;
+        let within = |from: f64, to: f64, count: usize| {
+            let first = from.floor().max(0.0) as usize;
+            first..(to.ceil() as usize + 1).min(count)
+        };
+        let rows = within(
+            row(ball.at[1] + ball.radius),
+            row(ball.at[1] - ball.radius),
+            size[1],
+        );
+        for r in rows {
+            let columns = within(
+                column(ball.at[0] - ball.radius),
+                column(ball.at[0] + ball.radius),
+                size[0],
+            );
+            for c in columns {
+                let x = place(c, r);
+                let off = [
+                    (x[0] - ball.at[0]) / ball.radius,
+                    (x[1] - ball.at[1]) / ball.radius,
+                ];
+                let rest = 1.0 - off[0] * off[0] - off[1] * off[1];
+                let front = rest.max(0.0).sqrt();
+                let depth = ball.depth - ball.radius * front;
+                let k = r * size[0] + c;
+                if rest < 0.0 || depth >= nearest[k] {
+                    continue;
+                }
+                nearest[k] = depth;
+                // Light from the upper left, towards the picture.
+                let light =
+                    (0.45 + 0.55 * (0.4 * off[1] - 0.3 * off[0] + 0.87 * front)).clamp(0.2, 1.0);
+                for (channel, colour) in ball.colour.into_iter().enumerate() {
+                    pixels[3 * k + channel] = (f64::from(colour) * light) as u8;
+                }
+            }
+        }
+    }
+    (pixels, size)
+}
+
+/// Keyword of the caption in a file.
+const CAPTION: &str = "Description";
+
+fn encode(
+    pixels: &[u8],
+    [width, height]: [usize; 2],
+    caption: &str,
+) -> Result<Vec<u8>, png::EncodingError> {
+    let mut bytes = Vec::new();
+    let mut encoder = png::Encoder::new(&mut bytes, width as u32, height as u32);
+    encoder.set_color(png::ColorType::Rgb);
+    encoder.set_depth(png::BitDepth::Eight);
+    encoder.add_text_chunk(CAPTION.into(), caption.into())?;
+    let mut writer = encoder.write_header()?;
+    writer.write_image_data(pixels)?;
+    writer.finish()?;
+    Ok(bytes)
+}
+
+/// The caption that a picture carries.
+fn caption(bytes: &[u8]) -> Option<String> {
+    let decoder = png::Decoder::new(std::io::Cursor::new(bytes));
+    let reader = decoder.read_info().ok()?;
+    let texts = &reader.info().uncompressed_latin1_text;
+    let found = texts.iter().find(|text| text.keyword == CAPTION)?;
+    Some(found.text.clone())
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn the_nearer_ball_hides_the_farther_and_captions_stay() {
+        let ball = |depth: f64, colour: [u8; 3], x: f64| Ball {
+            at: [x, 0.0],
+            depth,
+            radius: 1.0,
+            colour,
+        };
+        let (red, blue) = ([200, 0, 0], [0, 0, 200]);
+        let ground = [[[0.0, 0.0], [0.0, 1.0]]];
+        for order in [[0, 1], [1, 0]] {
+            let balls = [ball(0.0, red, 0.0), ball(5.0, blue, 0.0)];
+            let mut balls = Vec::from(balls);
+            if order[0] == 1 {
+                balls.swap(0, 1);
+            }
+            let (pixels, [w, h]) = paint(&balls, &ground);
+            let middle = 3 * (h / 2 * w + w / 2);
+            assert!(pixels[middle] > 100 && pixels[middle + 2] == 0);
+            // Corners: paper above the plane, ground below it.
+            assert_eq!(pixels[..3], PAPER);
+            assert_eq!(pixels[pixels.len() - 3..], GROUND);
+            let bytes = encode(&pixels, [w, h], "t = 1 s").unwrap();
+            assert_eq!(caption(&bytes).unwrap(), "t = 1 s");
+        }
+    }
+}

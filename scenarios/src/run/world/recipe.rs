@@ -1,0 +1,128 @@
+//! What a scene of grains brings with it.
+
+use super::build::World;
+use super::course::Ran;
+use super::workshop::Workshop;
+use crate::failure::Failure;
+use crate::scene::LawKeys;
+use crate::scene::world::{Materials, OutputKeys, StepKeys};
+use crate::summary::Summary;
+use crate::table::Table;
+use colluvium_dem::preparation::Packing;
+use colluvium_dem::{Simulation, Snapshot};
+use nalgebra::Vector3;
+use std::fmt::Debug;
+
+/// What a scene expects of itself before anything is computed, for its plan.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Expected {
+    /// Grains or parcels of the run.
+    pub grains: f64,
+    /// Grain-steps of the preparation, where they can be told.
+    pub preparation: Option<f64>,
+    /// Time that is simulated at most (s).
+    pub duration: f64,
+}
+
+/// How a run stands.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Course {
+    /// It goes on.
+    On,
+    /// What it was for has happened.
+    Over,
+}
+
+/// A scene of grains, in what it does. All methods are told the scene file for their messages.
+pub trait Recipe: Debug + Sync {
+    /// What the scene is, in a sentence.
+    fn about(&self) -> String;
+
+    /// What grains and walls are made of.
+    fn materials(&self, origin: &str) -> Result<Materials, Failure>;
+
+    /// The keys of the contact law.
+    fn contact(&self) -> &LawKeys;
+
+    /// Seed of all random numbers.
+    fn seed(&self) -> u64;
+
+    /// Size of the computed parcels over that of the grains.
+    fn coarse_graining(&self) -> f64;
+
+    /// The time step's keys.
+    fn step(&self) -> &StepKeys;
+
+    /// The output's keys.
+    fn output(&self) -> &OutputKeys;
+
+    /// Name or file of a packing to start from.
+    fn packing(&self) -> Option<&str>;
+
+    /// What the preparation goes by: a packing that was made by anything else is refused. None where the
+    /// scene has no preparation of its own.
+    fn provenance(&self) -> Option<toml::Table>;
+
+    /// Puts the grains in place.
+    fn prepare(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure>;
+
+    /// The world around a packing.
+    fn world(
+        &self,
+        packing: &Packing,
+        materials: &Materials,
+        origin: &str,
+    ) -> Result<World, Failure>;
+
+    /// What is to be expected.
+    fn expected(&self, materials: &Materials) -> Expected;
+
+    /// What the scene leaves out besides what its law does.
+    fn left_out(&self) -> Vec<&'static str>;
+
+    /// Lines of the plan that only this scene has: a topic and a text.
+    fn plan(&self) -> Vec<(String, String)> {
+        Vec::new()
+    }
+
+    /// Steps between two calls of [`Recipe::steer`], for a step of this length (s).
+    fn steer_every(&self, _timestep: f64) -> u64 {
+        u64::MAX
+    }
+
+    /// Drives the run, at step 0 and then every so many steps. `state` is the recipe's own memory, empty at
+    /// first; it is part of checkpoints.
+    fn steer(
+        &self,
+        _simulation: &mut Simulation,
+        _state: &mut Vec<f64>,
+    ) -> Result<Course, Failure> {
+        Ok(Course::On)
+    }
+
+    /// Own columns of `history.csv`, with units.
+    fn columns(&self) -> Vec<(String, &'static str)> {
+        Vec::new()
+    }
+
+    /// Their values at a row.
+    fn look(&self, _simulation: &mut Simulation, _seen: &Snapshot, _state: &[f64]) -> Vec<f64> {
+        Vec::new()
+    }
+
+    /// Direction in which pictures look, and which way is up in them.
+    fn view(&self) -> [Vector3<f64>; 2] {
+        [Vector3::y(), Vector3::z()]
+    }
+
+    /// Whether pictures show clusters besides speeds.
+    fn shows_clusters(&self) -> bool {
+        false
+    }
+
+    /// Results of the run for the summary, and further tables.
+    fn conclude(&self, ran: &mut Ran, summary: &mut Summary) -> Result<Vec<Table>, Failure>;
+
+    /// Results that runs are compared by (`pareto`).
+    fn compared(&self) -> Vec<&'static str>;
+}

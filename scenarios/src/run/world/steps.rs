@@ -1,0 +1,151 @@
+//! The steps `[[prepare]]` of a scene, done one after the other in the workshop.
+
+use super::workshop::{Surroundings, Workshop, with_friction};
+use crate::failure::Failure;
+use crate::scene::world::{Place, PrepareKeys, PrepareKind};
+use colluvium_dem::Wall;
+use colluvium_dem::preparation::{Aggregate, CentralCompaction, Relaxation, Stages};
+use nalgebra::{UnitQuaternion, Vector3};
+
+/// Acceleration that rest is measured by where nothing pulls (m/s²).
+const NONE: f64 = 1e-3;
+
+/// What surrounds the grains of all steps: the scene's own walls and its gravity at the start.
+#[derive(Clone, Debug)]
+pub struct Around {
+    /// Walls.
+    pub walls: Vec<Wall>,
+    /// Uniform acceleration (m/s²).
+    pub gravity: Vector3<f64>,
+}
+
+impl Around {
+    /// Acceleration that rest is measured by (m/s²).
+    pub fn acceleration(&self) -> f64 {
+        let g = self.gravity.norm();
+        if g > 0.0 { g } else { NONE }
+    }
+}
+
+/// Does all steps.
+pub fn prepare(
+    shop: &mut Workshop,
+    steps: &[PrepareKeys],
+    around: &Around,
+    origin: &str,
+) -> Result<(), Failure> {
+    for (k, keys) in steps.iter().enumerate() {
+        let section = format!("prepare[{k}]");
+        let place = Place {
+            origin,
+            section: &section,
+        };
+        step(shop, keys, around, place)?;
+    }
+    Ok(())
+}
+
+fn step(
+    shop: &mut Workshop,
+    keys: &PrepareKeys,
+    around: &Around,
+    at: Place,
+) -> Result<(), Failure> {
+    let step = keys.step(at)?;
+    let acceleration = around.acceleration();
+    let laws = match keys.friction {
+        Some(friction) => with_friction(&shop.materials.laws, friction),
+        None => shop.materials.laws.clone(),
+    };
+    let surroundings = Surroundings {
+        laws,
+        walls: around.walls.clone(),
+        gravity: around.gravity,
+        speed: 0.0,
+    };
+    let relaxation = |acceleration: f64| {
+        let usual = Relaxation::under(acceleration);
+        Relaxation {
+            damping: keys.damping.unwrap_or(usual.damping),
+            patience: keys.patience.unwrap_or(usual.patience),
+            ..usual
+        }
+    };
+    let velocity = Vector3::from(keys.velocity.unwrap_or_default());
+    let point = Vector3::from(keys.point.unwrap_or_default());
+    match (keys.r#do, step.amount) {
+        (PrepareKind::Insert, Some(amount)) => shop.insert(step.region, amount, velocity),
+        (PrepareKind::Pour, Some(amount)) => {
+            let surroundings = Surroundings {
+                speed: velocity.norm(),
+                ..surroundings
+            };
+            let how = (velocity, keys.interval);
+            let rest = relaxation(acceleration);
+            shop.pour(&surroundings, (step.region, amount), how, &rest)
+        }
+        (PrepareKind::Relax, _) => shop.relax(&surroundings, &relaxation(acceleration)),
+        (PrepareKind::Stages, _) => {
+            let usual = Stages::at(&keys.gravities.clone().unwrap_or_default());
+            let stages = Stages {
+                damping: keys.damping.unwrap_or(usual.damping),
+                patience: keys.patience.unwrap_or(usual.patience),
+                ..usual
+            };
+            shop.stages(&surroundings, &stages)
+        }
+        (PrepareKind::Compact, _) => {
+            let accelerations = keys.accelerations.unwrap_or([acceleration; 2]);
+            let spec = CentralCompaction {
+                center: point,
+                probe: keys.radius.unwrap_or_default(),
+                solid_fraction: keys.solid_fraction.unwrap_or_default(),
+                tolerance: keys.tolerance.unwrap_or(0.02),
+                accelerations,
+                relaxation: relaxation(accelerations[0]),
+            };
+            let fall = compaction_speed(shop, accelerations[1], point);
+            let surroundings = Surroundings {
+                walls: Vec::new(),
+                gravity: Vector3::zeros(),
+                speed: fall,
+                ..surroundings
+            };
+            shop.compact(&surroundings, &spec)
+        }
+        (PrepareKind::Jam, _) => shop.jam(keys.count.unwrap_or_default()),
+        (PrepareKind::Grow, _) => {
+            let first = &shop.materials.ingredients[0];
+            let spec = Aggregate {
+                growth: keys.growth(),
+                grains: keys.count.unwrap_or_default(),
+                sizes: first.sizes.clone(),
+                density: first.density,
+                material: first.material,
+                overlap: 0.0,
+                seed: shop.seed,
+            };
+            shop.grow(&spec)
+        }
+        (PrepareKind::Trim, _) => shop.trim(&step.region, keys.whole.unwrap_or(false)),
+        (PrepareKind::Glue, _) => shop.glue(&step.region),
+        (PrepareKind::Scale, _) => shop.scale(keys.factor.unwrap_or(1.0)),
+        (PrepareKind::Place, _) => {
+            let turn = Vector3::from(keys.turn_degrees.unwrap_or_default()) * 1f64.to_radians();
+            shop.place(UnitQuaternion::from_scaled_axis(turn), point)
+        }
+        // Every step that needs an amount has been checked to have one.
+        (PrepareKind::Insert | PrepareKind::Pour, None) => Ok(()),
+    }
+}
+
+/// Speed of two grains that meet after a fall to the point from the farthest place (m/s).
+pub fn compaction_speed(shop: &Workshop, acceleration: f64, point: Vector3<f64>) -> f64 {
+    let away = shop
+        .packing
+        .grains
+        .iter()
+        .map(|g| (g.position - point).norm());
+    let farthest = away.fold(0.0, f64::max);
+    2.0 * (2.0 * acceleration * farthest).sqrt()
+}

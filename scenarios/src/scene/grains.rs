@@ -1,0 +1,104 @@
+//! A scene of grains of one's own: all sections, nothing taken for granted.
+//!
+//! A file of this kind stands for itself: keys it leaves out are left out, and not those of the bundled
+//! example.
+
+use super::world::{
+    BondKeys, BoundaryKeys, CrackKeys, GrainMaterialKeys, GravityKeys, Materials, OutputKeys,
+    Place, PrepareKeys, StepKeys, SurfaceKeys, Triple, WallKeys, materials,
+};
+use super::{LawKeys, SceneError};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+use std::collections::BTreeMap;
+
+/// Grains, walls, bonds, gravity and a preparation, as the file says.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct GrainsScene {
+    /// Seed of all random numbers.
+    #[serde(default)]
+    #[schemars(extend("minimum" = 0, "maximum" = 9007199254740991_i64))]
+    pub seed: u64,
+    /// Size of the computed parcels over that of the grains; left out: 1.
+    #[serde(default = "one")]
+    #[schemars(extend("minimum" = 1.0, "maximum" = 1.0e6))]
+    pub coarse_graining: f64,
+    /// Time that is simulated after the preparation (s).
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e9))]
+    pub duration: f64,
+    /// A packing to start from: a name, under which the preparation is kept and found again, or a file
+    /// of an earlier run, `packing.h5`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub packing: Option<String>,
+    /// Velocity that all free grains are given at the start (m/s).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub velocity: Option<Triple>,
+    /// The step.
+    #[serde(default)]
+    pub timestep: StepKeys,
+    /// What is written.
+    #[serde(default)]
+    pub output: OutputKeys,
+    /// The law of all contacts.
+    pub contact: LawKeys,
+    /// Kinds of grains by name.
+    pub grains: BTreeMap<String, GrainMaterialKeys>,
+    /// Materials of walls by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub surfaces: BTreeMap<String, SurfaceKeys>,
+    /// Walls by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub walls: BTreeMap<String, WallKeys>,
+    /// Bonds by name; they are made after the preparation.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub bonds: BTreeMap<String, BondKeys>,
+    /// Cracks by name.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub cracks: BTreeMap<String, CrackKeys>,
+    /// What pulls the grains.
+    #[serde(default)]
+    pub gravity: GravityKeys,
+    /// The box; left out: open space.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub boundaries: Option<BoundaryKeys>,
+    /// How grains are put in place.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub prepare: Vec<PrepareKeys>,
+}
+
+fn one() -> f64 {
+    1.0
+}
+
+impl GrainsScene {
+    /// Its materials, of parcels where there are any.
+    pub fn materials(&self, origin: &str) -> Result<Materials, SceneError> {
+        materials(
+            &self.grains,
+            &self.surfaces,
+            &self.contact,
+            self.coarse_graining,
+            origin,
+        )
+    }
+
+    pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {
+        self.materials(origin)?;
+        if self.prepare.is_empty() && self.packing.is_none() {
+            return Err(SceneError::MissingKey {
+                file: origin.to_owned(),
+                key: "prepare".into(),
+                wanted: "steps [[prepare]], or a `packing` to start from".into(),
+            });
+        }
+        for (k, step) in self.prepare.iter().enumerate() {
+            let section = format!("prepare[{k}]");
+            step.step(Place {
+                origin,
+                section: &section,
+            })?;
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,121 @@
+//! The scenes that stand on the shared sections of grains: one line each.
+//!
+//! A scene is a struct of keys, a recipe (`run::world::Recipe`) and a bundled file of the same name.
+
+use super::{GrainsScene, SceneError};
+use crate::run::world::Recipe;
+use serde_json::Value;
+
+macro_rules! kinds {
+    ($($(#[$doc:meta])* $variant:ident($keys:ty) = $name:literal),* $(,)?) => {
+        /// A scene of grains.
+        #[derive(Clone, Debug, PartialEq)]
+        pub enum Kind {
+            $($(#[$doc])* $variant($keys)),*
+        }
+
+        impl Kind {
+            /// Their names.
+            pub const NAMES: &[&str] = &[$($name),*];
+
+            /// Reads the keys of the scene of this name.
+            pub fn read(name: &str, table: toml::Table) -> Option<Result<Kind, toml::de::Error>> {
+                match name {
+                    $($name => Some(table.try_into().map(Kind::$variant)),)*
+                    _ => None,
+                }
+            }
+
+            /// The JSON Schema of the scene of this name.
+            pub fn schema(name: &str) -> Option<Value> {
+                match name {
+                    $($name => Some(schemars::schema_for!($keys).to_value()),)*
+                    _ => None,
+                }
+            }
+
+            /// Every key as it was read.
+            pub fn to_table(&self) -> Result<toml::Table, toml::ser::Error> {
+                match self {
+                    $(Kind::$variant(keys) => toml::Table::try_from(keys),)*
+                }
+            }
+
+            /// Limits that involve more than one key.
+            pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {
+                match self {
+                    $(Kind::$variant(keys) => keys.check_together(origin),)*
+                }
+            }
+
+            /// What it does.
+            pub fn recipe(&self) -> &dyn Recipe {
+                match self {
+                    $(Kind::$variant(keys) => keys,)*
+                }
+            }
+        }
+    };
+}
+
+kinds! {
+    /// A recipe of one's own.
+    Grains(GrainsScene) = "grains",
+}
+
+/// Dotted paths of files in scenes of grains; `*` stands for any name.
+const FILES: [&str; 3] = ["walls.*.file", "walls.*.motion.file", "gravity.file"];
+
+/// Makes relative paths of a scene file relative to that file's folder.
+pub(super) fn anchor(table: &mut toml::Table, folder: &std::path::Path) {
+    for path in FILES {
+        anchor_at(table, path, folder);
+    }
+    let named = |value: &toml::Value| value.as_str().is_some_and(|s| !s.ends_with(".h5"));
+    if !table.get("packing").is_some_and(named) {
+        super::layers::anchor_path(table, "packing", folder);
+    }
+}
+
+fn anchor_at(table: &mut toml::Table, path: &str, folder: &std::path::Path) {
+    match path.split_once(".*.") {
+        Some((head, rest)) => {
+            if let Some(toml::Value::Table(named)) = table.get_mut(head) {
+                for (_, inner) in named.iter_mut() {
+                    if let toml::Value::Table(inner) = inner {
+                        anchor_at(inner, rest, folder);
+                    }
+                }
+            }
+        }
+        None => super::layers::anchor_path(table, path, folder),
+    }
+}
+
+/// The files that a scene reads.
+pub(super) fn inputs(table: &toml::Table) -> Vec<std::path::PathBuf> {
+    let mut found = Vec::new();
+    for path in FILES {
+        gather(table, path, &mut found);
+    }
+    let packing = table.get("packing").and_then(toml::Value::as_str);
+    found.extend(packing.filter(|s| s.ends_with(".h5")).map(Into::into));
+    found
+}
+
+fn gather(table: &toml::Table, path: &str, into: &mut Vec<std::path::PathBuf>) {
+    match path.split_once(".*.") {
+        Some((head, rest)) => {
+            let named = table.get(head).and_then(toml::Value::as_table);
+            for inner in named.into_iter().flat_map(|t| t.values()) {
+                if let Some(inner) = inner.as_table() {
+                    gather(inner, rest, into);
+                }
+            }
+        }
+        None => {
+            let file = super::layers::get(table, path).and_then(toml::Value::as_str);
+            into.extend(file.map(Into::into));
+        }
+    }
+}
