@@ -52,6 +52,7 @@ pub mod linear_solver;
 pub mod plane_shear;
 pub mod plane_wave;
 pub mod rheology;
+pub mod terrain;
 pub mod units;
 pub mod vertical_chute;
 pub mod wall_friction;
