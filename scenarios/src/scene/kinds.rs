@@ -3,7 +3,8 @@
 //! A scene is a struct of keys, a recipe (`run::world::Recipe`) and a bundled file of the same name.
 
 use super::{
-    AngleOfReposeScene, BallImpactScene, BoulderScene, GrainsScene, SceneError, SiloScene, TensileScene,
+    AngleOfReposeScene, BallImpactScene, BoulderScene, GrainsScene, SceneError, SiloScene,
+    TensileScene,
 };
 use crate::run::world::Recipe;
 use serde_json::Value;

@@ -24,7 +24,7 @@ pub fn touching(simulation: &mut Simulation) -> Vec<[u32; 2]> {
             let (a, b) = (place[contact.grain], place[other]);
             Some([a.min(b), a.max(b)])
         }
-        Partner::Wall(_) => None,
+        Partner::Wall(_) | Partner::Body(_) => None,
     };
     let mut pairs: Vec<[u32; 2]> = seen.contacts.iter().filter_map(pair).collect();
     pairs.sort_unstable();

@@ -117,6 +117,7 @@ pub fn step_for(materials: &Materials, around: &Surroundings, safety: f64) -> Op
         law: around.laws.clone(),
         grains,
         walls: around.walls.clone(),
+        bodies: Vec::new(),
         timestep: 1.0,
         threads: Threads::Serial,
     };
