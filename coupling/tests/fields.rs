@@ -81,6 +81,8 @@ fn commotion(seed: u64) -> Snapshot {
         grains,
         contacts,
         bonds: Vec::new(),
+        bodies: Vec::new(),
+        body_contacts: Vec::new(),
     }
 }
 
@@ -293,6 +295,7 @@ fn collapse(rough: bool, steps: u64) -> (Simulation, Snapshot) {
         law: law.into(),
         grains,
         walls: vec![Wall::plane(Vector3::zeros(), Vector3::z())],
+        bodies: Vec::new(),
         timestep: timestep::step(1.0, 2000.0, 80.0),
         threads: Threads::Serial,
     })

@@ -234,7 +234,7 @@ pub fn contacts(snapshot: &Snapshot) -> Frame {
     };
     let other = |c: &ContactSample| match c.partner {
         Partner::Grain(j) => i64::from(grains[j].id),
-        Partner::Wall(_) => -1,
+        Partner::Wall(_) | Partner::Body(_) => -1,
     };
     let links: Vec<Link> = touching.chain(bonded).collect();
     let scalars = |read: fn(&Link) -> f64| Values::Scalars(links.iter().map(read).collect());

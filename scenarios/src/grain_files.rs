@@ -192,6 +192,8 @@ fn snapshot(instant: &Instant, unsaid: &Unsaid) -> Result<Snapshot, String> {
         grains,
         contacts,
         bonds: Vec::new(),
+        bodies: Vec::new(),
+        body_contacts: Vec::new(),
     })
 }
 

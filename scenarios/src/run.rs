@@ -1,8 +1,12 @@
 //! Running a scene: directory, checkpoints, results.
 
+mod angle_of_repose;
 pub mod bagnold;
+mod ball_impact;
 pub mod bed;
+mod boulder;
 pub mod chute;
+mod comet_ball;
 pub mod energy_table;
 pub mod grain_table;
 mod grains;
@@ -12,7 +16,9 @@ pub mod incline;
 mod march_record;
 pub mod precheck;
 pub mod settle;
+mod silo;
 pub mod step;
+mod tensile;
 mod tumbling_box;
 pub mod world;
 

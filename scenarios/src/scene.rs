@@ -4,10 +4,14 @@
 //! bundled scene of that kind, so every default has one home: the bundled file. The same schema
 //! that `colluvium schema` prints is what input is checked against.
 
+mod angle_of_repose;
 mod bagnold;
+mod ball_impact;
 mod bed;
+mod boulder;
 mod check;
 mod chute;
+mod comet;
 mod error;
 mod friction_keys;
 mod grains;
@@ -19,12 +23,18 @@ mod law_layers;
 mod layer_case;
 pub mod layers;
 mod settle;
+mod silo;
+mod tensile;
 mod tumbling_box;
 pub mod world;
 
+pub use angle_of_repose::AngleOfReposeScene;
 pub use bagnold::{BagnoldGrid, BagnoldScene, FrictionLaw, RheologyKeys, SolverKeys, SolverMethod};
+pub use ball_impact::BallImpactScene;
 pub use bed::Pace;
+pub use boulder::BoulderScene;
 pub use chute::ChuteScene;
+pub use comet::{CometKeys, CometPreparationKeys, MixKind};
 pub use error::SceneError;
 pub use grains::GrainsScene;
 pub use impact::{ImpactScene, RollingKeys};
@@ -38,6 +48,8 @@ pub use law::{
 };
 pub use layer_case::{LayerCase, LayerVisitor};
 pub use settle::{SettleFloor, SettleGrains, SettleScene};
+pub use silo::SiloScene;
+pub use tensile::{ClampKind, TensileScene};
 pub use tumbling_box::{Attitude, BedKeys, LanderKeys, TumblingBoxScene};
 
 use crate::rheology_file;
@@ -45,7 +57,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// The names and texts of the bundled scenes.
-pub const BUNDLED: [(&str, &str); 10] = [
+pub const BUNDLED: [(&str, &str); 15] = [
     (
         "incline-moderate",
         include_str!("../scenes/incline-moderate.toml"),
@@ -67,6 +79,14 @@ pub const BUNDLED: [(&str, &str); 10] = [
     ("chute", include_str!("../scenes/chute.toml")),
     ("settle", include_str!("../scenes/settle.toml")),
     ("grains", include_str!("../scenes/grains.toml")),
+    ("tensile-test", include_str!("../scenes/tensile-test.toml")),
+    ("boulder-drop", include_str!("../scenes/boulder-drop.toml")),
+    (
+        "angle-of-repose",
+        include_str!("../scenes/angle-of-repose.toml"),
+    ),
+    ("silo", include_str!("../scenes/silo.toml")),
+    ("ball-impact", include_str!("../scenes/ball-impact.toml")),
     ("tumbling-box", include_str!("../scenes/tumbling-box.toml")),
 ];
 

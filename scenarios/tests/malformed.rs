@@ -57,6 +57,21 @@ fn keys(table: &toml::Table, path: &str, found: &mut Vec<String>) {
     }
 }
 
+/// Keys of `upper` laid over those of `lower`.
+fn laid_over(lower: &toml::Table, upper: toml::Table) -> toml::Table {
+    let mut all = lower.clone();
+    for (key, value) in upper {
+        let value = match (all.get(&key), value) {
+            (Some(toml::Value::Table(below)), toml::Value::Table(above)) => {
+                laid_over(below, above).into()
+            }
+            (_, value) => value,
+        };
+        all.insert(key, value);
+    }
+    all
+}
+
 /// Keys that the bundled scene does not give, but the kind reads.
 const FURTHER: [(&str, &[&str]); 5] = [
     (
@@ -126,7 +141,13 @@ fn odd_values_of_every_key_of_every_scene_are_refused_by_name_or_taken() {
         let (mut refused, mut taken) = (0, Vec::new());
         for key in &all {
             for odd in ODD {
-                fs::write(&path, format!("scene = \"{name}\"\n{key} = {odd}\n")).unwrap();
+                let own = format!("scene = \"{name}\"\n{key} = {odd}\n");
+                // Such a scene stands for itself: the odd value among all others.
+                let text = match name {
+                    "grains" => laid_over(&table, own.parse().unwrap()).to_string(),
+                    _ => own,
+                };
+                fs::write(&path, text).unwrap();
                 match check(&path) {
                     Ok(()) => taken.push(format!("{key} = {odd}")),
                     Err(failure) => {
@@ -205,8 +226,8 @@ fn scenes_with_broken_bytes_are_refused_or_taken() {
             }
         }
     }
-    println!("{refused} of 480 refused");
-    assert!(refused > 240, "{refused}");
+    println!("{refused} of {} refused", 60 * scene::BUNDLED.len());
+    assert!(refused > 30 * scene::BUNDLED.len(), "{refused}");
 }
 
 /// Texts that no scene is, and what the message must say besides the file's name.

@@ -7,7 +7,6 @@ pub mod impacts;
 pub mod laws;
 pub mod rebound;
 pub mod silo;
-pub mod slope;
 mod starts;
 
 pub use starts::{StartError, chute_start, read_start, settle_start, settled_start};

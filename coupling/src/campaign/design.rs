@@ -53,8 +53,10 @@ pub struct Prospect {
 /// What flows at the given slopes (degrees) would say.
 pub fn prospect(law: &GuessedLaw, precision: &Precision, slopes: &[f64]) -> Prospect {
     let sum: Matrix3<f64> = slopes.iter().map(|s| information(law, precision, *s)).sum();
-    // I_0 by its own size: determinants of numbers of one size compare.
-    let determinant = sum.determinant();
+    // What rounding leaves of the determinant of a singular matrix is no information.
+    let size: f64 = (0..3).map(|k| sum[(k, k)]).product();
+    let determinant = Some(sum.determinant()).filter(|d| *d > 1e-11 * size);
+    let determinant = determinant.unwrap_or(0.0);
     let errors = match sum.try_inverse() {
         Some(c) if determinant > 0.0 => std::array::from_fn(|k| c[(k, k)].max(0.0).sqrt()),
         _ => [f64::INFINITY; 3],

@@ -215,6 +215,16 @@ fn judge_runs(e: &Evidence, good: &mut bool, text: &mut Vec<String>) {
             100.0 * weight
         ));
     }
+    let lost = used()
+        .filter_map(|r| r.checks)
+        .map(|c| c.mass_outside)
+        .fold(0.0, f64::max);
+    if lost > 0.0 {
+        text.push(format!(
+            "Up to {:.2} % of a flow's mass lies outside the averaging layers: thrown up, or through the base.",
+            100.0 * lost
+        ));
+    }
     let overlap = used().map(|r| r.largest_overlap).fold(0.0, f64::max);
     if overlap > LARGEST_OVERLAP {
         text.push(format!(

@@ -276,7 +276,7 @@ impl Balance {
             let (own, other) = (c.grain, c.partner);
             let fixed = |p: Partner| match p {
                 Partner::Grain(j) => snapshot.grains[j].fixed,
-                Partner::Wall(_) => true,
+                Partner::Wall(_) | Partner::Body(_) => true,
             };
             let mut side = |i: usize, beyond: Partner, f: Vector3<f64>, arm, turn| {
                 if snapshot.grains[i].fixed {

@@ -379,7 +379,7 @@ fn sides(
     let own = &snapshot.grains[contact.grain];
     let other = match contact.partner {
         Partner::Grain(j) => Some(&snapshot.grains[j]),
-        Partner::Wall(_) => None,
+        Partner::Wall(_) | Partner::Body(_) => None,
     };
     let side = |grain: &GrainSample,
                 beyond: Option<&GrainSample>,

@@ -219,7 +219,7 @@ fn say_cost(
             "{rate:.3e} grain-steps/s on one thread, measured now on a lattice of {PROBE_GRAINS} such grains"
         ),
     );
-    if !(grains > 0.0) {
+    if grains.is_nan() || grains <= 0.0 {
         lines.say(
             "cost",
             "open: the number of grains comes out of the preparation",

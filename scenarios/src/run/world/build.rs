@@ -36,6 +36,8 @@ pub struct World {
     pub box_motion: BoxMotion,
     /// Where grains leave the world.
     pub outlet: Option<Outlet>,
+    /// Grains that join the packing at the start, behind it in number.
+    pub grains: Vec<Grain>,
     /// Velocity that all free grains are given (m/s).
     pub velocity: Option<Vector3<f64>>,
     /// Largest speed of two surfaces against each other beyond that of the start and of a fall (m/s).
@@ -59,6 +61,7 @@ impl World {
             cracks: Vec::new(),
             box_motion: BoxMotion::Rest,
             outlet: None,
+            grains: Vec::new(),
             velocity: None,
             speed: 0.0,
             duration,
@@ -99,6 +102,7 @@ impl Stand {
                 grain.velocity += velocity;
             }
         }
+        grains.extend(&world.grains);
         let mut setup = Setup {
             domain: world.domain.unwrap_or(packing.domain),
             gravity: world.gravity,

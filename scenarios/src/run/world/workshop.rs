@@ -13,7 +13,7 @@ use colluvium_dem::preparation::{
 };
 use colluvium_dem::timestep::{Conditions, Shares};
 use colluvium_dem::{
-    BoxMotion, Domain, Edge, Grain, Laws, Mindlin, Region, Setup, SetupError, Simulation,
+    BoxMotion, Domain, Edge, Grain, Laws, Mindlin, Normal, Region, Setup, SetupError, Simulation,
     Tangential, TangentialSpring, Threads, Wall,
 };
 use nalgebra::{UnitQuaternion, Vector3};
@@ -33,7 +33,8 @@ pub struct Workshop<'a> {
     pub seed: u64,
     /// Step over that which the limits allow.
     pub safety: f64,
-    threads: Threads,
+    /// How steps are shared out.
+    pub threads: Threads,
     watch: &'a mut dyn FnMut(&RestMeasures) -> ControlFlow<()>,
 }
 
@@ -79,6 +80,49 @@ pub fn with_friction(laws: &Laws, friction: f64) -> Laws {
         };
     }
     laws
+}
+
+/// The laws of Hooke and Hertz at a multiple of their stiffness; others as they are.
+pub fn softened(laws: &Laws, factor: f64) -> Laws {
+    let mut laws = laws.clone();
+    let pairs = laws.pairs.iter_mut().map(|(_, _, law)| law);
+    for law in laws.own.iter_mut().chain(pairs) {
+        match &mut law.normal {
+            Normal::Hooke(hooke) => hooke.stiffness *= factor,
+            Normal::Hertz(hertz) => hertz.effective_modulus *= factor,
+            _ => continue,
+        }
+        if let Tangential::Mindlin(mindlin) = &mut law.tangential {
+            mindlin.effective_shear *= factor;
+        }
+    }
+    laws
+}
+
+/// The step (s) of a preparation of such grains in such surroundings, where anything limits it.
+pub fn step_for(materials: &Materials, around: &Surroundings, safety: f64) -> Option<f64> {
+    let grains = stand_ins(materials);
+    let fall = Conditions::of(&grains, &around.gravity);
+    let conditions = Conditions {
+        speed: fall.speed + around.speed,
+        ..fall
+    };
+    let shares = Shares {
+        safety,
+        ..Shares::default()
+    };
+    let setup = Setup {
+        domain: open_space(),
+        gravity: around.gravity,
+        law: around.laws.clone(),
+        grains,
+        walls: around.walls.clone(),
+        bodies: Vec::new(),
+        timestep: 1.0,
+        threads: Threads::Serial,
+    };
+    let choice = setup.choose_step(&conditions, &shares).ok()?;
+    choice.seconds.is_finite().then_some(choice.seconds)
 }
 
 /// How a periodic box is shrunk, or widened, about its centre.
@@ -229,6 +273,21 @@ impl<'a> Workshop<'a> {
         let rest = relax(&mut simulation, spec, self.watch).map_err(ended)?;
         self.take(simulation);
         self.note("relax", rest);
+        Ok(())
+    }
+
+    /// Lets the grains go for a time (s), and stops what still moves.
+    pub fn let_go(&mut self, around: &Surroundings, time: f64) -> Result<(), Failure> {
+        let mut simulation = self.simulation(around)?;
+        let steps = (time / simulation.timestep()).ceil() as u64;
+        simulation
+            .advance(steps)
+            .map_err(|error| Failure::Run(format!("preparation: {error}")))?;
+        simulation.damp(0.0);
+        self.take(simulation);
+        if crate::interruption::requested() {
+            return Err(ended(SetupError::Interrupted));
+        }
         Ok(())
     }
 
