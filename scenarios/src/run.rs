@@ -19,6 +19,7 @@ pub mod settle;
 mod silo;
 pub mod step;
 mod tensile;
+mod tumbling_box;
 pub mod world;
 
 use crate::checkpoint::{Checkpoint, Checkpoints};

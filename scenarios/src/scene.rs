@@ -25,6 +25,7 @@ pub mod layers;
 mod settle;
 mod silo;
 mod tensile;
+mod tumbling_box;
 pub mod world;
 
 pub use angle_of_repose::AngleOfReposeScene;
@@ -49,13 +50,14 @@ pub use layer_case::{LayerCase, LayerVisitor};
 pub use settle::{SettleFloor, SettleGrains, SettleScene};
 pub use silo::SiloScene;
 pub use tensile::{ClampKind, TensileScene};
+pub use tumbling_box::{Attitude, BedKeys, LanderKeys, TumblingBoxScene};
 
 use crate::rheology_file;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// The names and texts of the bundled scenes.
-pub const BUNDLED: [(&str, &str); 14] = [
+pub const BUNDLED: [(&str, &str); 15] = [
     (
         "incline-moderate",
         include_str!("../scenes/incline-moderate.toml"),
@@ -85,6 +87,7 @@ pub const BUNDLED: [(&str, &str); 14] = [
     ),
     ("silo", include_str!("../scenes/silo.toml")),
     ("ball-impact", include_str!("../scenes/ball-impact.toml")),
+    ("tumbling-box", include_str!("../scenes/tumbling-box.toml")),
 ];
 
 /// The text of a bundled scene.

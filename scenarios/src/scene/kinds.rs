@@ -4,7 +4,7 @@
 
 use super::{
     AngleOfReposeScene, BallImpactScene, BoulderScene, GrainsScene, SceneError, SiloScene,
-    TensileScene,
+    TensileScene, TumblingBoxScene,
 };
 use crate::run::world::Recipe;
 use serde_json::Value;
@@ -74,6 +74,8 @@ kinds! {
     Silo(SiloScene) = "silo",
     /// A ball that falls into a bed.
     BallImpact(BallImpactScene) = "ball-impact",
+    /// A lander on a bed.
+    TumblingBox(TumblingBoxScene) = "tumbling-box",
 }
 
 /// Dotted paths of files in scenes of grains; `*` stands for any name.
