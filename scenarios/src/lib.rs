@@ -12,6 +12,7 @@ pub mod command_line;
 pub mod cost;
 pub mod failure;
 pub mod frames;
+pub mod height_files;
 pub mod interruption;
 pub mod journal;
 pub mod mesh_files;
