@@ -14,6 +14,7 @@ pub mod cost;
 pub mod failure;
 pub mod frames;
 pub mod grain_files;
+pub mod height_files;
 pub mod interruption;
 pub mod journal;
 pub mod mesh_files;
