@@ -60,7 +60,14 @@ const LAMMPS: [PeerPoint; 3] = [
 /// Scenes and what is changed for the suite: glass on a quarter of its floor, for its campaign is four times as long.
 const MATERIALS: [(&str, &[&str]); 3] = [
     ("incline-moderate", &[]),
-    ("incline-glass", &["scale=0.5"]),
+    (
+        "incline-glass",
+        &[
+            "grains.count=1500",
+            "floor.length_diameters=10",
+            "floor.width_diameters=5",
+        ],
+    ),
     ("incline-gravel", &[]),
 ];
 
