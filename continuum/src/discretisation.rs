@@ -139,7 +139,11 @@ impl QuadraturePoint {
     #[inline]
     pub(crate) fn pressure_change(&self, p: &[f64]) -> f64 {
         let (cells, weights) = self.pressures();
-        cells.iter().zip(weights).map(|(&c, w)| w * p[c]).sum::<f64>()
+        cells
+            .iter()
+            .zip(weights)
+            .map(|(&c, w)| w * p[c])
+            .sum::<f64>()
     }
 }
 
@@ -285,6 +289,11 @@ impl Discretisation {
     /// Mass of each velocity's control volume.
     pub fn mass(&self) -> &[f64] {
         &self.mass
+    }
+
+    /// Component of an unknown velocity.
+    pub(crate) fn component_of(&self, velocity: usize) -> usize {
+        self.components[velocity]
     }
 
     /// The divergence, integrated over cells, as entries (cell, velocity, signed face area).

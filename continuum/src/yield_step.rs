@@ -131,7 +131,10 @@ fn momentum_residual<R>(
                 point.weight * (point.rates(0)[slot] * s[0] + point.rates(1)[slot] * s[1]);
         }
     }
-    let forces = discretisation.divergence().iter().zip(discretisation.gradient());
+    let forces = discretisation
+        .divergence()
+        .iter()
+        .zip(discretisation.gradient());
     for (&(cell, j, _), force) in forces {
         residual[j] -= force * state.p[cell];
     }

@@ -1,12 +1,15 @@
 //! The plan of a scene: what would be modelled and why, what is left out, what it would cost.
 
 mod bed;
+mod collapse;
 mod law;
 
 use crate::failure::Failure;
 use crate::run;
 use crate::run::step;
-use crate::scene::{BagnoldScene, ImpactScene, InclineScene, InclineStart, Scene, SceneBody};
+use crate::scene::{
+    BagnoldScene, ImpactScene, InclineScene, InclineStart, RheologyKeys, Scene, SceneBody,
+};
 use colluvium_coupling::incline::{InclineRun, InclineSpec};
 use colluvium_dem::preparation::settle_incline_bed;
 use colluvium_dem::timestep::Choice;
@@ -20,6 +23,7 @@ pub fn plan(scene: &Scene) -> Result<String, Failure> {
     match &scene.body {
         SceneBody::Incline(body) => incline(scene, body),
         SceneBody::Bagnold(body) => Ok(bagnold(body)),
+        SceneBody::Collapse(body) => Ok(collapse::collapse(body)),
         SceneBody::Impact(body) => impact(scene, body),
         SceneBody::Chute(body) => bed::chute(body),
         SceneBody::Settle(body) => bed::settle(body),
@@ -34,6 +38,22 @@ impl Lines {
     fn say(&mut self, topic: &str, text: &str) {
         // Writing to a string does not fail.
         let _ = writeln!(self.0, "{topic:<16} {text}");
+    }
+
+    fn say_rheology(&mut self, law: &RheologyKeys) {
+        self.say(
+            "rheology",
+            &format!(
+                "μ_s {}, μ_2 {}, I_0 {}, d {} m, φ {}, ρ_s {} kg/m³ ({})",
+                law.mu_s,
+                law.mu_2,
+                law.i_0,
+                law.diameter,
+                law.solid_fraction,
+                law.grain_density,
+                law.source.as_deref().unwrap_or("by numbers")
+            ),
+        );
     }
 
     /// A step, what is said of it, and every other limit with the step that it would allow.
@@ -196,19 +216,7 @@ fn bagnold(body: &BagnoldScene) -> String {
             body.depth, body.slope_degrees
         ),
     );
-    lines.say(
-        "rheology",
-        &format!(
-            "μ_s {}, μ_2 {}, I_0 {}, d {} m, φ {}, ρ_s {} kg/m³ ({})",
-            law.mu_s,
-            law.mu_2,
-            law.i_0,
-            law.diameter,
-            law.solid_fraction,
-            law.grain_density,
-            body.rheology.source.as_deref().unwrap_or("by numbers")
-        ),
-    );
+    lines.say_rheology(&body.rheology);
     let columns = body.grid.columns;
     lines.say(
         "grid",
@@ -243,7 +251,7 @@ fn bagnold(body: &BagnoldScene) -> String {
             lines.say("warning", &remark);
         }
     }
-    for remark in body.law_remarks() {
+    for remark in body.rheology.remarks() {
         lines.say("warning", &remark);
     }
     let unit = (body.depth / body.gravity).sqrt();

@@ -3,6 +3,7 @@
 pub mod bagnold;
 pub mod bed;
 pub mod chute;
+pub mod collapse;
 pub mod energy_table;
 pub mod grain_table;
 pub mod impact;
@@ -192,6 +193,7 @@ pub fn check(scene: &Scene) -> Result<(), Failure> {
         SceneBody::Impact(body) => impact::check(scene, body),
         SceneBody::Chute(body) => chute::check(scene, body),
         SceneBody::Settle(body) => settle::check(scene, body),
+        SceneBody::Collapse(body) => collapse::check(scene, body),
     }
 }
 
@@ -231,6 +233,7 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> {
             SceneBody::Impact(body) => impact::run(body, &mut under),
             SceneBody::Chute(body) => chute::run(body, &mut under),
             SceneBody::Settle(body) => settle::run(body, &mut under),
+            SceneBody::Collapse(body) => collapse::run(body, &mut under),
         })
     });
     let (begun, wall_s, going_on) = (under.begun, under.wall_s(), under.resumed.is_some());

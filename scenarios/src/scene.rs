@@ -8,6 +8,7 @@ mod bagnold;
 mod bed;
 mod check;
 mod chute;
+mod collapse;
 mod error;
 mod impact;
 mod incline;
@@ -19,6 +20,7 @@ mod settle;
 pub use bagnold::{BagnoldGrid, BagnoldScene, RheologyKeys, SolverKeys, SolverMethod};
 pub use bed::Pace;
 pub use chute::ChuteScene;
+pub use collapse::{CollapseGrid, CollapseModel, CollapseScene, CollapseSolver, ThinLayerKind};
 pub use error::SceneError;
 pub use impact::{ImpactScene, RollingKeys};
 pub use incline::{
@@ -35,7 +37,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// The names and texts of the bundled scenes.
-pub const BUNDLED: [(&str, &str); 8] = [
+pub const BUNDLED: [(&str, &str); 9] = [
     (
         "incline-moderate",
         include_str!("../scenes/incline-moderate.toml"),
@@ -56,6 +58,10 @@ pub const BUNDLED: [(&str, &str); 8] = [
     ),
     ("chute", include_str!("../scenes/chute.toml")),
     ("settle", include_str!("../scenes/settle.toml")),
+    (
+        "column-collapse",
+        include_str!("../scenes/column-collapse.toml"),
+    ),
 ];
 
 /// The text of a bundled scene.
@@ -79,6 +85,8 @@ pub enum SceneBody {
     Chute(Box<ChuteScene>),
     /// Grains that settle in a box.
     Settle(Box<SettleScene>),
+    /// A column of material that collapses.
+    Collapse(Box<CollapseScene>),
 }
 
 impl SceneBody {
@@ -90,6 +98,7 @@ impl SceneBody {
             SceneBody::Impact(scene) => toml::Table::try_from(scene),
             SceneBody::Chute(scene) => toml::Table::try_from(scene),
             SceneBody::Settle(scene) => toml::Table::try_from(scene),
+            SceneBody::Collapse(scene) => toml::Table::try_from(scene),
         }
         .unwrap_or_default()
     }
@@ -174,7 +183,7 @@ impl Scene {
         // only the stiffness keys have defaults to drop.
         let kind = family(&name);
         let drops = match kind {
-            Family::Bagnold => &[],
+            Family::Bagnold | Family::Collapse => &[],
             _ => choices,
         };
         let impact = matches!(kind, Family::Impact);
@@ -268,6 +277,7 @@ impl Scene {
             SceneBody::Impact(scene) => scene.check_together(origin),
             SceneBody::Chute(scene) => scene.check_together(origin),
             SceneBody::Settle(scene) => scene.check_together(origin),
+            SceneBody::Collapse(scene) => scene.check_together(origin),
         }
     }
 }
@@ -312,6 +322,7 @@ fn body(name: &str, table: &toml::Table) -> Result<SceneBody, String> {
         Family::Impact => SceneBody::Impact(table.try_into().map_err(plain)?),
         Family::Chute => SceneBody::Chute(table.try_into().map_err(plain)?),
         Family::Settle => SceneBody::Settle(table.try_into().map_err(plain)?),
+        Family::Collapse => SceneBody::Collapse(table.try_into().map_err(plain)?),
     })
 }
 
@@ -328,6 +339,7 @@ enum Family {
     Impact,
     Chute,
     Settle,
+    Collapse,
 }
 
 fn family(name: &str) -> Family {
@@ -336,6 +348,7 @@ fn family(name: &str) -> Family {
         "two-spheres" | "sphere-on-plane" => Family::Impact,
         "chute" => Family::Chute,
         "settle" => Family::Settle,
+        "column-collapse" => Family::Collapse,
         _ => Family::Incline,
     }
 }
@@ -348,7 +361,7 @@ fn alternatives(name: &str) -> &'static [&'static [&'static str]] {
             "contact.stiffness",
             "contact.stiffness_from_speed",
         ]],
-        Family::Bagnold => rheology_file::ALTERNATIVES,
+        Family::Bagnold | Family::Collapse => rheology_file::ALTERNATIVES,
         Family::Impact => &law::CHOICES,
         Family::Chute | Family::Settle => &BED_CHOICES,
     }
@@ -370,6 +383,7 @@ fn body_schema(name: &str) -> Value {
         Family::Impact => schemars::schema_for!(ImpactScene),
         Family::Chute => schemars::schema_for!(ChuteScene),
         Family::Settle => schemars::schema_for!(SettleScene),
+        Family::Collapse => schemars::schema_for!(CollapseScene),
     };
     schema.to_value()
 }

@@ -125,9 +125,7 @@ impl Faces {
             if lies_on_wall(topology, fractions, component, face) {
                 return Face::Still;
             }
-            let on_wall = self
-                .wall_under(grid, topology, component, face)
-                .is_some();
+            let on_wall = self.wall_under(grid, topology, component, face).is_some();
             if !on_wall || mass <= MASSLESS || thin_layer == ThinLayer::Following {
                 return Face::Loose;
             }
@@ -169,13 +167,18 @@ impl Faces {
             },
         };
         let along = directions.iter().map(|&(_, axis, side)| beside[axis][side]);
-        let diagonal = directions.iter().enumerate().flat_map(|(nth, &(_, axis, side))| {
-            let first = beside[axis][side];
-            directions[nth + 1..].iter().map(move |&(_, axis, side)| match first {
-                NONE => NONE,
-                first => topology.face_neighbours[component][first][axis][side],
-            })
-        });
+        let diagonal = directions
+            .iter()
+            .enumerate()
+            .flat_map(|(nth, &(_, axis, side))| {
+                let first = beside[axis][side];
+                directions[nth + 1..]
+                    .iter()
+                    .map(move |&(_, axis, side)| match first {
+                        NONE => NONE,
+                        first => topology.face_neighbours[component][first][axis][side],
+                    })
+            });
         let against = directions
             .iter()
             .map(|&(_, axis, side)| beside[axis][1 - side]);
@@ -192,15 +195,17 @@ impl Faces {
         face: usize,
     ) -> Option<(usize, usize)> {
         let other = (0..DIMENSIONS).filter(|&axis| axis != component);
-        other.flat_map(|axis| [(axis, 0), (axis, 1)]).find(|&(axis, side)| {
-            let ends = topology.face_neighbours[component][face][axis][side] == NONE;
-            let edge = [0, grid.axes()[axis].cells()][side];
-            let rigid = grid.axes()[axis]
-                .boundary_at(edge)
-                .is_some_and(|boundary| boundary.outer_pressure().is_none());
-            let along = self.acceleration[component].abs();
-            ends && rigid && weight_onto(&self.acceleration, axis, side) > along
-        })
+        other
+            .flat_map(|axis| [(axis, 0), (axis, 1)])
+            .find(|&(axis, side)| {
+                let ends = topology.face_neighbours[component][face][axis][side] == NONE;
+                let edge = [0, grid.axes()[axis].cells()][side];
+                let rigid = grid.axes()[axis]
+                    .boundary_at(edge)
+                    .is_some_and(|boundary| boundary.outer_pressure().is_none());
+                let along = self.acceleration[component].abs();
+                ends && rigid && weight_onto(&self.acceleration, axis, side) > along
+            })
     }
 
     /// Gives every face that follows the velocity of its unknown.
@@ -227,11 +232,7 @@ fn lies_on_wall(topology: &Topology, fractions: &[f64], component: usize, face: 
 }
 
 /// Gravity normal to a wall on one side of an axis, positive towards the wall.
-pub(crate) fn weight_onto(
-    acceleration: &[f64; DIMENSIONS],
-    axis: usize,
-    side: usize,
-) -> f64 {
+pub(crate) fn weight_onto(acceleration: &[f64; DIMENSIONS], axis: usize, side: usize) -> f64 {
     let towards = if side == 1 { 1.0 } else { -1.0 };
     (towards * acceleration[axis]).max(0.0)
 }

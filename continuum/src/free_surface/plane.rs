@@ -163,7 +163,10 @@ mod tests {
             for fraction in [0.0, 1e-12, 0.01, 0.3, 0.5, 0.77, 1.0 - 1e-9, 1.0] {
                 let plane = Plane::of_fraction(normal, fraction);
                 let volume = plane.volume_in(UNIT.0, UNIT.1);
-                assert!((volume - fraction).abs() < 1e-10, "{normal:?} {fraction} {volume}");
+                assert!(
+                    (volume - fraction).abs() < 1e-10,
+                    "{normal:?} {fraction} {volume}"
+                );
             }
         }
     }

@@ -77,8 +77,9 @@ impl Topology {
                 let index = unflatten(cell, cells);
                 std::array::from_fn(|axis| match axes[axis].faces_of_cell(index[axis]) {
                     None => [NONE; 2],
-                    Some(pair) => pair
-                        .map(|face| replaced(index, axis, Some(face), grid.faces(axis))),
+                    Some(pair) => {
+                        pair.map(|face| replaced(index, axis, Some(face), grid.faces(axis)))
+                    }
                 })
             })
             .collect();

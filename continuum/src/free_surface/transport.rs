@@ -71,24 +71,27 @@ impl Transport {
         let (planes, start) = (&self.planes, &self.start[axis]);
         self.fluxes.clear();
         self.fluxes
-            .extend(motion.topology.face_cells[axis].iter().zip(start).map(
-                |(&[low, high], u)| {
-                    let length = u * motion.courant[axis];
-                    if low == NONE || high == NONE || length == 0.0 {
-                        return 0.0;
-                    }
-                    let (mut from, mut to) = ([0.0; 3], [1.0; 3]);
-                    let donor = if length > 0.0 {
-                        from[axis] = 1.0 - length;
-                        low
-                    } else {
-                        to[axis] = -length;
-                        high
-                    };
-                    let volume = volume_in(fractions[donor], planes[donor].as_ref(), from, to);
-                    volume.clamp(0.0, fractions[donor]) * length.signum()
-                },
-            ));
+            .extend(
+                motion.topology.face_cells[axis]
+                    .iter()
+                    .zip(start)
+                    .map(|(&[low, high], u)| {
+                        let length = u * motion.courant[axis];
+                        if low == NONE || high == NONE || length == 0.0 {
+                            return 0.0;
+                        }
+                        let (mut from, mut to) = ([0.0; 3], [1.0; 3]);
+                        let donor = if length > 0.0 {
+                            from[axis] = 1.0 - length;
+                            low
+                        } else {
+                            to[axis] = -length;
+                            high
+                        };
+                        let volume = volume_in(fractions[donor], planes[donor].as_ref(), from, to);
+                        volume.clamp(0.0, fractions[donor]) * length.signum()
+                    }),
+            );
     }
 
     fn update_fractions(
@@ -163,9 +166,17 @@ impl Transport {
                 continue;
             }
             let (donor, receiver, beyond) = if volume > 0.0 {
-                (face, next, topology.face_neighbours[component][face][axis][0])
+                (
+                    face,
+                    next,
+                    topology.face_neighbours[component][face][axis][0],
+                )
             } else {
-                (next, face, topology.face_neighbours[component][next][axis][1])
+                (
+                    next,
+                    face,
+                    topology.face_neighbours[component][next][axis][1],
+                )
             };
             let own = mass(donor);
             let slope = if beyond != NONE && mass(beyond) > MASSLESS && mass(receiver) > MASSLESS {
@@ -192,7 +203,10 @@ fn limited(left: f64, right: f64) -> f64 {
     if left * right <= 0.0 {
         return 0.0;
     }
-    let size = (0.5 * (left + right)).abs().min(2.0 * left.abs()).min(2.0 * right.abs());
+    let size = (0.5 * (left + right))
+        .abs()
+        .min(2.0 * left.abs())
+        .min(2.0 * right.abs());
     size * left.signum()
 }
 

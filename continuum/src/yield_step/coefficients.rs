@@ -66,7 +66,10 @@ impl StepMatrix {
         for (&slot, m) in self.mass.iter().zip(discretisation.mass()) {
             values[slot] += m / dt;
         }
-        let entries = discretisation.divergence().iter().zip(discretisation.gradient());
+        let entries = discretisation
+            .divergence()
+            .iter()
+            .zip(discretisation.gradient());
         for (slots, (&(cell, _, area), force)) in self.divergence.iter().zip(entries) {
             values[slots[0]] -= force;
             if !released[cell] {

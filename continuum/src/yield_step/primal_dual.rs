@@ -205,13 +205,14 @@ impl PrimalDual {
     fn assemble<R: Rheology>(&mut self, problem: &StepProblem<'_, R>, u_old: &[f64]) {
         let discretisation = problem.discretisation;
         let linear = &self.points;
-        self.matrix.fill(discretisation, problem.dt, &self.released, |q| {
-            let mut c = linear[q].by_rate;
-            let mean = 0.5 * (c[0][1] + c[1][0]);
-            c[0][1] = mean;
-            c[1][0] = mean;
-            (c, linear[q].by_pressure)
-        });
+        self.matrix
+            .fill(discretisation, problem.dt, &self.released, |q| {
+                let mut c = linear[q].by_rate;
+                let mean = 0.5 * (c[0][1] + c[1][0]);
+                c[0][1] = mean;
+                c[1][0] = mean;
+                (c, linear[q].by_pressure)
+            });
         let velocities = discretisation.velocities();
         let (momentum, continuity) = self.right_hand_side.split_at_mut(velocities);
         let mass = discretisation.mass();
@@ -225,7 +226,10 @@ impl PrimalDual {
                         + point.rates(1)[slot] * linear.stress[1]);
             }
         }
-        let forces = discretisation.divergence().iter().zip(discretisation.gradient());
+        let forces = discretisation
+            .divergence()
+            .iter()
+            .zip(discretisation.gradient());
         for (&(cell, j, _), force) in forces {
             momentum[j] += force * self.trial.p[cell];
         }
@@ -360,10 +364,14 @@ impl PrimalDual {
             return divergence;
         }
         let volume = discretisation.grid().cell_volume();
-        self.trial.p.iter().zip(continuity).fold(0.0, |largest, (p, d)| {
-            let d = *d / volume;
-            largest_or_nan(largest, if p - d <= 0.0 { *p } else { d })
-        })
+        self.trial
+            .p
+            .iter()
+            .zip(continuity)
+            .fold(0.0, |largest, (p, d)| {
+                let d = *d / volume;
+                largest_or_nan(largest, if p - d <= 0.0 { *p } else { d })
+            })
     }
 
     fn is_converged<R>(&self, problem: &StepProblem<'_, R>, residuals: &Residuals) -> bool {

@@ -141,10 +141,11 @@ impl<R: Rheology> YieldSolver<R> for RegularisedViscosity {
             self.evaluate_viscosity(problem);
             self.evaluate_stress(problem);
             let viscosity = &self.viscosity;
-            self.matrix.fill(discretisation, problem.dt, &self.released, |q| {
-                let eta = viscosity[q];
-                ([[eta, 0.0], [0.0, eta]], [0.0; COMPONENTS])
-            });
+            self.matrix
+                .fill(discretisation, problem.dt, &self.released, |q| {
+                    let eta = viscosity[q];
+                    ([[eta, 0.0], [0.0, eta]], [0.0; COMPONENTS])
+                });
             let (momentum, continuity) = self.right_hand_side.split_at_mut(velocities);
             momentum_residual(problem, &state.u, &self.trial, momentum);
             momentum.iter_mut().for_each(|r| *r = -*r);

@@ -5,7 +5,7 @@ use crate::cost::Cost;
 use crate::failure::Failure;
 use crate::interruption;
 use crate::progress::Bar;
-use crate::scene::{BagnoldScene, Scene, SolverMethod};
+use crate::scene::{BagnoldScene, RheologyKeys, Scene, SolverMethod};
 use crate::state_hash;
 use crate::summary::{Model, Quantity, Summary};
 use crate::table::Table;
@@ -26,22 +26,26 @@ pub const LEFT_OUT: [&str; 6] = [
     "non-local effects near the base",
 ];
 
+/// The law that a scene describes.
+pub fn material(keys: &RheologyKeys) -> MuI {
+    MuI {
+        mu_s: keys.mu_s,
+        mu_2: keys.mu_2,
+        i_0: keys.i_0,
+        diameter: keys.diameter,
+        solid_fraction: keys.solid_fraction,
+        grain_density: keys.grain_density,
+        cohesion: keys.cohesion,
+    }
+}
+
 /// The case that a scene describes.
 pub fn case(scene: &BagnoldScene) -> BagnoldCase {
-    let r = &scene.rheology;
     BagnoldCase {
         slope: scene.slope_degrees.to_radians(),
         depth: scene.depth,
         gravity: scene.gravity,
-        rheology: MuI {
-            mu_s: r.mu_s,
-            mu_2: r.mu_2,
-            i_0: r.i_0,
-            diameter: r.diameter,
-            solid_fraction: r.solid_fraction,
-            grain_density: r.grain_density,
-            cohesion: r.cohesion,
-        },
+        rheology: material(&scene.rheology),
         cells: scene.cells(),
         columns: (scene.grid.columns > 1).then_some(scene.grid.columns as usize),
     }
@@ -185,7 +189,7 @@ pub fn describe(
             Some((solution.boundary_shear_stress[0] - weight).abs() / weight);
     }
     summary.state_hash = state_hash::of(&[&solution.u, &solution.p]);
-    summary.remarks.extend(scene.law_remarks());
+    summary.remarks.extend(scene.rheology.remarks());
     let exact = "exact Bagnold profile";
     let rests = case.slope.tan() <= case.rheology.mu_s;
     let error_unit = if rests { "m/s" } else { "1" };

@@ -65,7 +65,11 @@ fn step(
     let motion = Motion {
         topology,
         courant: [courant; 2],
-        order: if nth.is_multiple_of(2) { &[0, 1] } else { &[1, 0] },
+        order: if nth.is_multiple_of(2) {
+            &[0, 1]
+        } else {
+            &[1, 0]
+        },
         incompressible: &incompressible,
     };
     transport.advance(&motion, fractions, velocity);
@@ -86,14 +90,28 @@ fn vortex_error(cells: usize) -> f64 {
             (PI * time / period).cos() / PI * ((PI * x).sin() * (PI * z).sin()).powi(2)
         });
         let courant = period / steps as f64 * cells as f64;
-        step(&mut transport, &topology, &mut fractions, &mut velocity, (courant, n));
+        step(
+            &mut transport,
+            &topology,
+            &mut fractions,
+            &mut velocity,
+            (courant, n),
+        );
     }
     let now: f64 = fractions.iter().sum();
-    assert!((now / volume - 1.0).abs() < 1e-13, "{:e}", now / volume - 1.0);
+    assert!(
+        (now / volume - 1.0).abs() < 1e-13,
+        "{:e}",
+        now / volume - 1.0
+    );
     for f in &fractions {
         assert!((-1e-13..=1.0 + 1e-12).contains(f), "{f:e} {:e}", f - 1.0);
     }
-    let miss: f64 = fractions.iter().zip(&start).map(|(a, b)| (a - b).abs()).sum();
+    let miss: f64 = fractions
+        .iter()
+        .zip(&start)
+        .map(|(a, b)| (a - b).abs())
+        .sum();
     miss / (cells * cells) as f64
 }
 
@@ -117,7 +135,13 @@ fn uniform_motion_is_exact() {
     let mut transport = Transport::default();
     let volume: f64 = fractions.iter().sum();
     for n in 0..400 {
-        step(&mut transport, &topology, &mut fractions, &mut velocity, (0.4, n));
+        step(
+            &mut transport,
+            &topology,
+            &mut fractions,
+            &mut velocity,
+            (0.4, n),
+        );
     }
     for (component, expected) in [(0, u), (1, w)] {
         for (face, value) in velocity[component].iter().enumerate() {
@@ -133,7 +157,11 @@ fn uniform_motion_is_exact() {
         [0.4 + 160.0 * u / 48.0, 0.45 + 160.0 * w / 48.0].map(|x: f64| x.rem_euclid(1.0)),
         0.21,
     );
-    let miss: f64 = fractions.iter().zip(&moved).map(|(a, b)| (a - b).abs()).sum();
+    let miss: f64 = fractions
+        .iter()
+        .zip(&moved)
+        .map(|(a, b)| (a - b).abs())
+        .sum();
     eprintln!("translated disc misses {:e} of its volume", miss / volume);
     assert!(miss / volume < 0.02);
 }
@@ -159,7 +187,13 @@ fn momentum_is_conserved() {
             0.1 * (2.0 * PI * x).sin() * (2.0 * PI * z).cos()
         });
         let old = momentum(&fractions, &velocity);
-        step(&mut transport, &topology, &mut fractions, &mut velocity, (0.3, n));
+        step(
+            &mut transport,
+            &topology,
+            &mut fractions,
+            &mut velocity,
+            (0.3, n),
+        );
         let new = momentum(&fractions, &velocity);
         for c in 0..2 {
             assert!((new[c] - old[c]).abs() < 1e-14 * scale);
