@@ -25,7 +25,8 @@ fn collapse_writes_front_and_deposit() {
     assert!((area / 0.08 - 1.0).abs() < 1e-9, "{area}");
     // It stands at first and does not run back.
     assert!(fronts.len() > 100 && fronts[0][0] == 0.0);
-    assert!((fronts[0][1] / 0.4 - 1.0).abs() < 0.05);
+    // The edge of a grid of 48 cells is known to a cell and a half.
+    assert!((fronts[0][1] / 0.4 - 1.0).abs() < 0.08);
     for pair in fronts.windows(2) {
         assert!(pair[1][0] > pair[0][0] && pair[1][1] > pair[0][1] - 0.01);
     }
