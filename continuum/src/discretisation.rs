@@ -295,6 +295,11 @@ impl Discretisation {
         &self.mass
     }
 
+    /// Component of an unknown velocity.
+    pub(crate) fn component_of(&self, velocity: usize) -> usize {
+        self.components[velocity]
+    }
+
     /// The divergence, integrated over cells, as entries (cell, velocity, signed face area).
     pub(crate) fn divergence(&self) -> &[(usize, usize, f64)] {
         &self.divergence

@@ -1,5 +1,12 @@
 //! Material with a moving free surface: how much of it lies in each cell, where its surface is, and
 //! how it moves.
+//!
+//! There is no air. A step moves volume and momentum ([`SurfaceFlow`]), finds out which velocities
+//! and pressures are unknowns where the material now lies, and solves for velocity, pressure and
+//! stress at once. Cells without material cost next to nothing.
+//!
+//! Axes are looped over by number and planes have three components, so that a third axis is a longer
+//! array; only the corners of quadrature points are written for a plane.
 
 mod faces;
 mod flow;
@@ -10,4 +17,4 @@ mod topology;
 mod transport;
 
 pub use faces::ThinLayer;
-pub use flow::{SurfaceFlow, SurfaceOptions, SurfaceState, SurfaceStep};
+pub use flow::{Spent, SurfaceFlow, SurfaceOptions, SurfaceState, SurfaceStep};

@@ -41,6 +41,7 @@
 //! ```
 
 pub mod bagnold;
+pub mod column_collapse;
 pub mod discretisation;
 mod error;
 pub mod flow;

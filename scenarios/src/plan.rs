@@ -1,6 +1,7 @@
 //! The plan of a scene: what would be modelled and why, what is left out, what it would cost.
 
 mod bed;
+mod collapse;
 mod law;
 mod world;
 
@@ -25,6 +26,7 @@ pub fn plan(scene: &Scene) -> Result<String, Failure> {
     match &scene.body {
         SceneBody::Incline(body) => incline(scene, body),
         SceneBody::Bagnold(body) => bagnold(body),
+        SceneBody::Collapse(body) => Ok(collapse::collapse(body)),
         SceneBody::Impact(body) => impact(scene, body),
         SceneBody::Chute(body) => bed::chute(body),
         SceneBody::Settle(body) => bed::settle(body),
@@ -40,6 +42,21 @@ impl Lines {
     fn say(&mut self, topic: &str, text: &str) {
         // Writing to a string does not fail.
         let _ = writeln!(self.0, "{topic:<16} {text}");
+    }
+
+    fn say_rheology(&mut self, law: &RheologyKeys) {
+        self.say(
+            "rheology",
+            &format!(
+                "{}{}, d {} m, φ {}, ρ_s {} kg/m³ ({})",
+                law.law.word(),
+                numbers_of_the_law(law),
+                law.diameter,
+                law.solid_fraction,
+                law.grain_density,
+                law.source.as_deref().unwrap_or("by numbers")
+            ),
+        );
     }
 
     /// A step, what is said of it, and every other limit with the step that it would allow.
@@ -218,18 +235,7 @@ fn bagnold(body: &BagnoldScene) -> Result<String, Failure> {
             body.depth, body.slope_degrees
         ),
     );
-    lines.say(
-        "rheology",
-        &format!(
-            "{}{}, d {} m, φ {}, ρ_s {} kg/m³ ({})",
-            r.law.word(),
-            numbers_of_the_law(r),
-            r.diameter,
-            r.solid_fraction,
-            r.grain_density,
-            r.source.as_deref().unwrap_or("by numbers")
-        ),
-    );
+    lines.say_rheology(&body.rheology);
     let columns = body.grid.columns;
     lines.say(
         "grid",
@@ -269,7 +275,7 @@ fn bagnold(body: &BagnoldScene) -> Result<String, Failure> {
             lines.say("warning", &remark);
         }
     }
-    for remark in body.law_remarks() {
+    for remark in body.rheology.remarks() {
         lines.say("warning", &remark);
     }
     let unit = (body.depth / body.gravity).sqrt();

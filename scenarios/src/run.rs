@@ -6,6 +6,7 @@ mod ball_impact;
 pub mod bed;
 mod boulder;
 pub mod chute;
+pub mod collapse;
 mod comet_ball;
 pub mod energy_table;
 pub mod grain_table;
@@ -230,6 +231,7 @@ pub fn check(scene: &Scene) -> Result<(), Failure> {
         SceneBody::Chute(body) => chute::check(scene, body),
         SceneBody::Settle(body) => settle::check(scene, body),
         SceneBody::Grains(kind) => world::course::check(scene, kind.recipe()),
+        SceneBody::Collapse(body) => collapse::check(scene, body),
     }
 }
 
@@ -278,6 +280,7 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> {
             SceneBody::Chute(body) => chute::run(body, &mut under),
             SceneBody::Settle(body) => settle::run(body, &mut under),
             SceneBody::Grains(kind) => world::course::run(kind.recipe(), &mut under),
+            SceneBody::Collapse(body) => collapse::run(body, &mut under),
         })
     });
     let (begun, wall_s, going_on) = (under.begun, under.wall_s(), under.resumed.is_some());

@@ -11,6 +11,7 @@ mod bed;
 mod boulder;
 mod check;
 mod chute;
+mod collapse;
 mod comet;
 mod error;
 mod friction_keys;
@@ -34,6 +35,7 @@ pub use ball_impact::BallImpactScene;
 pub use bed::Pace;
 pub use boulder::BoulderScene;
 pub use chute::ChuteScene;
+pub use collapse::{CollapseGrid, CollapseModel, CollapseScene, CollapseSolver, ThinLayerKind};
 pub use comet::{CometKeys, CometPreparationKeys, MixKind};
 pub use error::SceneError;
 pub use grains::GrainsScene;
@@ -57,7 +59,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// The names and texts of the bundled scenes.
-pub const BUNDLED: [(&str, &str); 15] = [
+pub const BUNDLED: [(&str, &str); 16] = [
     (
         "incline-moderate",
         include_str!("../scenes/incline-moderate.toml"),
@@ -88,6 +90,10 @@ pub const BUNDLED: [(&str, &str); 15] = [
     ("silo", include_str!("../scenes/silo.toml")),
     ("ball-impact", include_str!("../scenes/ball-impact.toml")),
     ("tumbling-box", include_str!("../scenes/tumbling-box.toml")),
+    (
+        "column-collapse",
+        include_str!("../scenes/column-collapse.toml"),
+    ),
 ];
 
 /// The text of a bundled scene.
@@ -113,6 +119,8 @@ pub enum SceneBody {
     Settle(Box<SettleScene>),
     /// Grains with walls, bonds, gravity and a preparation.
     Grains(Box<Kind>),
+    /// A column of material that collapses.
+    Collapse(Box<CollapseScene>),
 }
 
 impl SceneBody {
@@ -125,6 +133,7 @@ impl SceneBody {
             SceneBody::Chute(scene) => toml::Table::try_from(scene),
             SceneBody::Settle(scene) => toml::Table::try_from(scene),
             SceneBody::Grains(kind) => kind.to_table(),
+            SceneBody::Collapse(scene) => toml::Table::try_from(scene),
         }
         .unwrap_or_default()
     }
@@ -208,7 +217,7 @@ impl Scene {
         // only the stiffness keys have defaults to drop.
         let kind = family(&name);
         let drops = match kind {
-            Family::Bagnold => &[],
+            Family::Bagnold | Family::Collapse => &[],
             _ => choices,
         };
         let impact = matches!(kind, Family::Impact);
@@ -257,7 +266,7 @@ impl Scene {
             law_layers::check_read(&table, &set, (impact, true), option)?;
             law_layers::drop_unread(&mut table, impact);
         }
-        if matches!(kind, Family::Bagnold) {
+        if matches!(kind, Family::Bagnold | Family::Collapse) {
             // A bundled scene has the numbers of all laws, as defaults.
             if folder.is_some() && !friction_keys::chooses(&set) {
                 friction_keys::check_read(&table, &written, origin)?;
@@ -324,6 +333,7 @@ impl Scene {
             SceneBody::Chute(scene) => scene.check_together(origin),
             SceneBody::Settle(scene) => scene.check_together(origin),
             SceneBody::Grains(kind) => kind.check_together(origin),
+            SceneBody::Collapse(scene) => scene.check_together(origin),
         }
     }
 }
@@ -372,6 +382,7 @@ fn body(name: &str, table: &toml::Table) -> Result<SceneBody, String> {
             Some(kind) => SceneBody::Grains(Box::new(kind.map_err(plain)?)),
             None => return Err(format!("no scene is called `{name}`")),
         },
+        Family::Collapse => SceneBody::Collapse(table.try_into().map_err(plain)?),
     })
 }
 
@@ -389,6 +400,7 @@ enum Family {
     Chute,
     Settle,
     Grains,
+    Collapse,
 }
 
 /// What a scene of this kind builds on. A `grains` scene stands for itself: walls and grains of the
@@ -407,6 +419,7 @@ fn family(name: &str) -> Family {
         "chute" => Family::Chute,
         "settle" => Family::Settle,
         _ if Kind::NAMES.contains(&name) => Family::Grains,
+        "column-collapse" => Family::Collapse,
         _ => Family::Incline,
     }
 }
@@ -419,7 +432,7 @@ fn alternatives(name: &str) -> &'static [&'static [&'static str]] {
             "contact.stiffness",
             "contact.stiffness_from_speed",
         ]],
-        Family::Bagnold => rheology_file::ALTERNATIVES,
+        Family::Bagnold | Family::Collapse => rheology_file::ALTERNATIVES,
         Family::Impact | Family::Grains => &law::CHOICES,
         Family::Chute | Family::Settle => &BED_CHOICES,
     }
@@ -442,6 +455,7 @@ fn body_schema(name: &str) -> Value {
         Family::Chute => schemars::schema_for!(ChuteScene),
         Family::Settle => schemars::schema_for!(SettleScene),
         Family::Grains => return Kind::schema(name).unwrap_or_default(),
+        Family::Collapse => schemars::schema_for!(CollapseScene),
     };
     schema.to_value()
 }

@@ -7,13 +7,13 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::faces::{Face, Faces, ThinLayer};
+use super::faces::{ACTIVE, Face, Faces, ThinLayer};
 use super::fraction::reconstruct;
 use super::operators::{Material, Operators, POINTS};
 use super::plane::Plane;
 use super::topology::{NONE, Topology};
 use super::transport::{MASSLESS, Motion, Transport};
-use crate::discretisation::COMPONENTS;
+use crate::discretisation::{COMPONENTS, Discretisation};
 use crate::error::{Error, require};
 use crate::grid::{Axis, DIMENSIONS, Grid};
 use crate::rheology::Rheology;
@@ -102,11 +102,17 @@ pub struct SurfaceStep {
     pub max_speed: f64,
 }
 
+/// Least time by which the velocity moves on, over the time step.
+const LEAST_PUSH: f64 = 0.5;
+/// Free fall may shrink a cell at this rate: the round-off of a velocity over a cell.
+const FREE_FALL: f64 = 1e-12;
+/// A cell of larger divergence has let go.
+const DILATES: f64 = 1e-6;
 /// Stands for the pressure of cells that have none.
 const INACTIVE: f64 = -1.0;
 /// Most times that a step is halved.
 const MAX_CUTS: usize = 8;
-/// Share of the pattern's room: first step from rest, as a fraction of the free fall through a cell.
+/// First step from rest, over the time of free fall through a cell.
 const FIRST_STEP: f64 = 0.2;
 
 /// State of a flow with a moving surface, on all of its grid.
@@ -122,6 +128,8 @@ pub struct SurfaceState {
     pub stress: Vec<[f64; COMPONENTS]>,
     /// Time of the fractions.
     pub time: f64,
+    /// Time of the velocity, half a step ahead.
+    pub velocity_time: f64,
     /// Time step that the velocity is meant for; zero before the first.
     pub next_step: f64,
     /// Steps made.
@@ -142,8 +150,21 @@ pub struct SurfaceFlow<R> {
     solver: Option<(Vec<usize>, PrimalDual)>,
     unknowns: FlowState,
     momentum: Vec<f64>,
-    /// Wall time spent on transport, operators and the implicit step (s).
-    pub spent: [f64; 4],
+    divergence: Vec<f64>,
+    spent: Spent,
+}
+
+/// Wall time by phase of the step (s).
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Spent {
+    /// Moving volume and momentum.
+    pub transport: f64,
+    /// Finding the unknowns and making their operators.
+    pub operators: f64,
+    /// Analysing the pattern of the matrix.
+    pub analysis: f64,
+    /// Newton's method: assembly, factors, Krylov iterations.
+    pub newton: f64,
 }
 
 impl<R: Rheology> SurfaceFlow<R> {
@@ -179,7 +200,8 @@ impl<R: Rheology> SurfaceFlow<R> {
                 s: Vec::new(),
             },
             momentum: Vec::new(),
-            spent: [0.0; 4],
+            divergence: Vec::new(),
+            spent: Spent::default(),
             grid,
             topology,
             rheology,
@@ -194,8 +216,28 @@ impl<R: Rheology> SurfaceFlow<R> {
     }
 
     /// Goes on from another state of the same grid.
-    pub fn set_state(&mut self, state: SurfaceState) {
+    ///
+    /// # Errors
+    /// [`Error::ForeignState`] if the state belongs to another grid.
+    pub fn set_state(&mut self, state: SurfaceState) -> Result<(), Error> {
+        let cells = self.topology.cells();
+        let fits = state.fractions.len() == cells
+            && state.pressure.len() == cells
+            && state.stress.len() == cells * POINTS
+            && (0..DIMENSIONS).all(|c| state.velocity[c].len() == self.topology.faces(c));
+        if !fits {
+            return Err(Error::ForeignState {
+                found: state.fractions.len(),
+                expected: cells,
+            });
+        }
         self.state = state;
+        Ok(())
+    }
+
+    /// Where the time went.
+    pub fn spent(&self) -> Spent {
+        self.spent
     }
 
     /// The grid.
@@ -311,10 +353,13 @@ impl<R: Rheology> SurfaceFlow<R> {
         let mut growing_from = planned;
         for _ in 0..=MAX_CUTS {
             self.transport(dt);
-            // The velocity moves on by the mean of this step and the next.
+            // The velocity moves on to the middle of the next step, from wherever it is: the last one
+            // may have become shorter than it was planned.
             let next = self.allowed_step(growing_from);
-            let converged = self.accelerate(0.5 * (dt + next), &mut record)?;
-            if converged {
+            let until = self.state.time + dt + 0.5 * next;
+            let ahead = (until - self.state.velocity_time).max(LEAST_PUSH * dt);
+            if self.accelerate(ahead, &mut record)? {
+                self.state.velocity_time += ahead;
                 self.state.next_step = self.allowed_step(growing_from).min(next);
                 self.state.time += dt;
                 self.state.steps += 1;
@@ -348,6 +393,7 @@ impl<R: Rheology> SurfaceFlow<R> {
         for _ in 0..=MAX_CUTS {
             if self.accelerate(0.5 * dt, record)? {
                 self.state.next_step = dt;
+                self.state.velocity_time = 0.5 * dt;
                 return Ok(());
             }
             record.cuts += 1;
@@ -364,13 +410,9 @@ impl<R: Rheology> SurfaceFlow<R> {
             order.reverse();
         }
         let incompressible: Vec<bool> = (0..self.topology.cells())
-            .map(|cell| self.state.fractions[cell] > super::faces::ACTIVE)
-            .map(|full| full)
-            .collect();
-        let incompressible: Vec<bool> = incompressible
-            .iter()
-            .enumerate()
-            .map(|(cell, full)| *full && self.divergence(cell).abs() < 1e-6)
+            .map(|cell| {
+                self.state.fractions[cell] > ACTIVE && self.divergence(cell).abs() < DILATES
+            })
             .collect();
         self.transport.advance(
             &Motion {
@@ -382,7 +424,7 @@ impl<R: Rheology> SurfaceFlow<R> {
             &mut self.state.fractions,
             &mut self.state.velocity,
         );
-        self.spent[0] += clock.elapsed().as_secs_f64();
+        self.spent.transport += clock.elapsed().as_secs_f64();
     }
 
     fn divergence(&self, cell: usize) -> f64 {
@@ -421,8 +463,15 @@ impl<R: Rheology> SurfaceFlow<R> {
         }
         .operators();
         self.gather(&faces, &places);
+        if self.falls_freely(&discretisation, dt) {
+            self.spent.operators += clock.elapsed().as_secs_f64();
+            record.active_cells = faces.active.len();
+            record.residuals = Residuals::default();
+            self.scatter(&faces, &places, dt);
+            return Ok(true);
+        }
         let pattern = discretisation.pattern();
-        self.spent[1] += clock.elapsed().as_secs_f64();
+        self.spent.operators += clock.elapsed().as_secs_f64();
         let clock = std::time::Instant::now();
         if self
             .solver
@@ -434,7 +483,7 @@ impl<R: Rheology> SurfaceFlow<R> {
                 PrimalDual::new(&discretisation, self.options.solver)?,
             ));
         }
-        self.spent[2] += clock.elapsed().as_secs_f64();
+        self.spent.analysis += clock.elapsed().as_secs_f64();
         let clock = std::time::Instant::now();
         record.active_cells = faces.active.len();
         let load = discretisation.load(self.acceleration);
@@ -448,13 +497,41 @@ impl<R: Rheology> SurfaceFlow<R> {
             return Ok(false);
         };
         let report = solver.step(&problem, &mut self.unknowns)?;
-        self.spent[3] += clock.elapsed().as_secs_f64();
+        self.spent.newton += clock.elapsed().as_secs_f64();
         record.newton_iterations += report.iterations;
         record.residuals = report.residuals;
         if report.converged {
             self.scatter(&faces, &places, dt);
         }
         Ok(report.converged)
+    }
+
+    /// Without pressure and stress, and if gravity alone lets no cell shrink, free fall is the exact
+    /// solution: makes it, to the last bit, and says so.
+    fn falls_freely(&mut self, discretisation: &Discretisation, dt: f64) -> bool {
+        let unknowns = &mut self.unknowns;
+        let is_loose = unknowns.p.iter().all(|p| *p <= f64::MIN_POSITIVE)
+            && unknowns.s.iter().all(|s| *s == [0.0; COMPONENTS])
+            && self.rheology.threshold(1.0, 0.0).stress == 0.0;
+        if !is_loose {
+            return false;
+        }
+        self.divergence.clear();
+        self.divergence.resize(discretisation.cells(), 0.0);
+        let pushes = self.acceleration.map(|a| a * dt);
+        for &(cell, j, area) in discretisation.divergence() {
+            let push = pushes[discretisation.component_of(j)];
+            self.divergence[cell] += area * (unknowns.u[j] + push);
+        }
+        let volume = self.grid.cell_volume();
+        if self.divergence.iter().any(|d| *d < -FREE_FALL * volume) {
+            return false;
+        }
+        for (j, u) in unknowns.u.iter_mut().enumerate() {
+            *u += pushes[discretisation.component_of(j)];
+        }
+        unknowns.p.fill(0.0);
+        true
     }
 
     /// Velocity, pressure and stress of the unknowns from those of the grid.

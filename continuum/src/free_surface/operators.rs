@@ -20,7 +20,7 @@ const NEAREST_SURFACE: f64 = 0.005;
 const NEAREST_EXTRAPOLATION: f64 = 0.25;
 /// Cells with less material have no quadrature points.
 const EMPTY: f64 = 1e-9;
-/// Quadrature points of a cell, flat axes not counted out.
+/// Most quadrature points of a cell: fewer along flat axes.
 pub(crate) const POINTS: usize = 1 << DIMENSIONS;
 
 /// Material on a grid: what the operators are made from.
@@ -78,17 +78,6 @@ impl Material<'_> {
         mass
     }
 
-    /// Depth of the centre of a cell below the plane of another (itself, or one beside it along
-    /// `axis`), in cells.
-    fn depth(&self, of: usize, plane: &Plane, steps: [f64; DIMENSIONS]) -> f64 {
-        debug_assert!(of != NONE);
-        let mut point = [0.5; 3];
-        for (x, step) in point.iter_mut().zip(steps) {
-            *x += step;
-        }
-        plane.depth(point)
-    }
-
     /// Distance θ, in cells, from the centre of an active cell to the surface on the way to its
     /// inactive neighbour along an axis.
     fn surface_distance(&self, active: usize, other: usize, axis: usize, side: usize) -> f64 {
@@ -97,9 +86,9 @@ impl Material<'_> {
         let back = step.map(|s| -s);
         let here = [0.0; DIMENSIONS];
         let (inner, outer) = match (&self.planes[active], &self.planes[other]) {
-            (Some(a), Some(b)) => (self.depth(active, a, here), self.depth(other, b, here)),
-            (Some(a), None) => (self.depth(active, a, here), self.depth(active, a, step)),
-            (None, Some(b)) => (self.depth(other, b, back), self.depth(other, b, here)),
+            (Some(a), Some(b)) => (depth_of_centre(a, here), depth_of_centre(b, here)),
+            (Some(a), None) => (depth_of_centre(a, here), depth_of_centre(a, step)),
+            (None, Some(b)) => (depth_of_centre(b, back), depth_of_centre(b, here)),
             (None, None) => (0.5, -0.5),
         };
         if inner <= 0.0 {
@@ -231,21 +220,19 @@ impl Material<'_> {
     /// holds material.
     fn wall_share(&self, corner: [usize; DIMENSIONS]) -> Option<f64> {
         let axes = self.grid.axes();
-        let wall = (0..DIMENSIONS).find(|&axis| {
+        let rough = (0..DIMENSIONS).any(|axis| {
             axes[axis]
                 .boundary_at(corner[axis])
-                .is_some_and(|b| b.wall_velocity().is_some())
-        })?;
+                .is_some_and(|side| side.wall_velocity().is_some())
+        });
         let cells = self.cells_at_corner(corner);
-        let (mut all, mut filled) = (0, 0);
-        for cell in cells.into_iter().flatten() {
-            all += 1;
-            filled += usize::from(self.fractions[cell] > EMPTY);
-        }
-        // Where two walls meet nothing moves.
-        let along = 1 - wall;
-        let _ = along;
-        (filled > 0).then(|| f64::from(all) / filled as f64)
+        let all = cells.iter().flatten().count();
+        let filled = cells
+            .iter()
+            .flatten()
+            .filter(|&&cell| self.fractions[cell] > EMPTY)
+            .count();
+        (rough && filled > 0).then(|| all as f64 / filled as f64)
     }
 
     fn cells_at_corner(&self, corner: [usize; DIMENSIONS]) -> [Option<usize>; 4] {
@@ -359,4 +346,13 @@ impl Material<'_> {
             }
         }
     }
+}
+
+/// Depth below a plane, in cells, of the centre of the cell that lies so many steps from its own.
+fn depth_of_centre(plane: &Plane, steps: [f64; DIMENSIONS]) -> f64 {
+    let mut point = [0.5; 3];
+    for (x, step) in point.iter_mut().zip(steps) {
+        *x += step;
+    }
+    plane.depth(point)
 }

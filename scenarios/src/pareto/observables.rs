@@ -37,6 +37,10 @@ pub fn errors(scene: &Scene, run: &Path, reference: &Path) -> Result<Errors, Fai
             "restitution".to_owned(),
             result(run, reference, "restitution")?,
         )],
+        SceneBody::Collapse(_) => vec![
+            ("deposit".to_owned(), curve(run, reference, DEPOSIT)),
+            ("front".to_owned(), result(run, reference, "x_front")?),
+        ],
         SceneBody::Incline(_) | SceneBody::Bagnold(_) => {
             vec![("velocity".to_owned(), curve(run, reference, PROFILE))]
         }
@@ -83,6 +87,9 @@ pub fn against_reference(scene: &Scene) -> String {
         SceneBody::Chute(_) | SceneBody::Settle(_) => {
             "the reference run; largest relative error of kinetic energy (L2 over the time of the run), height of the centre of mass, solid fraction and coordination at the end".to_owned()
         }
+        SceneBody::Collapse(_) => {
+            "the reference run; the larger of the relative L2 error of the deposit's height and the relative error of the front".to_owned()
+        }
         _ => "the reference run".to_owned(),
     }
 }
@@ -91,6 +98,7 @@ pub fn against_reference(scene: &Scene) -> String {
 type Curve = [&'static str; 3];
 
 const ENERGY: Curve = ["energy.csv", "t", "kinetic_energy"];
+const DEPOSIT: Curve = ["deposit.csv", "x", "h"];
 const PROFILE: Curve = ["profile.csv", "z", "u"];
 
 /// Relative L2 difference of a curve, at the run's own points; NaN where one has none.

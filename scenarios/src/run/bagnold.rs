@@ -184,7 +184,7 @@ pub fn describe(
             Some((solution.boundary_shear_stress[0] - weight).abs() / weight);
     }
     summary.state_hash = state_hash::of(&[&solution.u, &solution.p]);
-    summary.remarks.extend(scene.law_remarks());
+    summary.remarks.extend(scene.rheology.remarks());
     let exact = "exact Bagnold profile";
     let rests = layer.rests();
     let error_unit = if rests { "m/s" } else { "1" };

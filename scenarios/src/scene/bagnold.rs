@@ -110,6 +110,25 @@ pub struct RheologyKeys {
     pub source: Option<String>,
 }
 
+impl RheologyKeys {
+    /// What has to be known of the law beyond its numbers, in words.
+    pub fn remarks(&self) -> Vec<String> {
+        let source = self.source.as_deref().unwrap_or("the scene");
+        let mut remarks = Vec::new();
+        if self.identified == Some(false) {
+            remarks.push(format!(
+                "Not identified: the data of the law from {source} do not determine μ_s, μ_2 and I_0 apart; outside the measured range it says nothing."
+            ));
+        }
+        if self.good == Some(false) {
+            remarks.push(format!(
+                "The calibration of the law from {source} was judged not good enough to feed a continuum."
+            ));
+        }
+        remarks
+    }
+}
+
 /// The grid.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
@@ -159,24 +178,6 @@ impl BagnoldScene {
     /// Cells across the depth at this scale.
     pub fn cells(&self) -> usize {
         (self.grid.cells as f64 * self.scale).round().max(4.0) as usize
-    }
-
-    /// What has to be known of the law beyond its numbers, in words.
-    pub fn law_remarks(&self) -> Vec<String> {
-        let r = &self.rheology;
-        let source = r.source.as_deref().unwrap_or("the scene");
-        let mut remarks = Vec::new();
-        if r.identified == Some(false) {
-            remarks.push(format!(
-                "Not identified: the data of the law from {source} do not determine μ_s, μ_2 and I_0 apart; outside the measured range it says nothing."
-            ));
-        }
-        if r.good == Some(false) {
-            remarks.push(format!(
-                "The calibration of the law from {source} was judged not good enough to feed a continuum."
-            ));
-        }
-        remarks
     }
 
     pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {

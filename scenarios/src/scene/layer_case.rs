@@ -1,6 +1,6 @@
 //! The continuum's case that a scene describes: where the name of a law becomes a type.
 
-use super::bagnold::{BagnoldScene, FrictionLaw};
+use super::bagnold::{BagnoldScene, FrictionLaw, RheologyKeys};
 use colluvium_continuum::Error;
 use colluvium_continuum::bagnold::{BagnoldCase, BagnoldSolution};
 use colluvium_continuum::layer::{Options, Progress};
@@ -46,19 +46,8 @@ impl LayerCase {
     /// Numbers with which the law means nothing.
     pub fn of(scene: &BagnoldScene) -> Result<LayerCase, Error> {
         let r = &scene.rheology;
-        // The scene's check has seen that what a law reads is there.
-        let number = |value: Option<f64>| value.unwrap_or(f64::NAN);
-        let mu_i = || MuI {
-            mu_s: number(r.mu_s),
-            mu_2: number(r.mu_2),
-            i_0: number(r.i_0),
-            diameter: r.diameter,
-            solid_fraction: r.solid_fraction,
-            grain_density: r.grain_density,
-            cohesion: r.cohesion,
-        };
         Ok(match r.law {
-            FrictionLaw::MuI => LayerCase::MuI(layer(scene, mu_i())),
+            FrictionLaw::MuI => LayerCase::MuI(layer(scene, r.mu_i())),
             FrictionLaw::Coulomb => LayerCase::Coulomb(layer(
                 scene,
                 Coulomb {
@@ -70,7 +59,7 @@ impl LayerCase {
             )),
             FrictionLaw::BarkerGray => LayerCase::BarkerGray(layer(
                 scene,
-                BarkerGray::new(mu_i(), number(r.alpha), number(r.mu_infinity))?,
+                BarkerGray::new(r.mu_i(), number(r.alpha), number(r.mu_infinity))?,
             )),
             FrictionLaw::Table => {
                 let points: Vec<[f64; 2]> = r
@@ -149,6 +138,26 @@ impl LayerCase {
         match self {
             LayerCase::Table(case) => Some(case.rheology.valid_inertial_numbers()),
             _ => None,
+        }
+    }
+}
+
+/// A number that the scene's check has seen to be there, as its law reads it.
+fn number(value: Option<f64>) -> f64 {
+    value.unwrap_or(f64::NAN)
+}
+
+impl RheologyKeys {
+    /// μ(I) with these numbers.
+    pub fn mu_i(&self) -> MuI {
+        MuI {
+            mu_s: number(self.mu_s),
+            mu_2: number(self.mu_2),
+            i_0: number(self.i_0),
+            diameter: self.diameter,
+            solid_fraction: self.solid_fraction,
+            grain_density: self.grain_density,
+            cohesion: self.cohesion,
         }
     }
 }
