@@ -173,5 +173,8 @@ fn our_own_series_comes_back_as_it_was_seen() {
     crate::vtkhdf::write(&path, frames).unwrap();
     let frames = crate::vtkhdf::read_series(&path).unwrap();
     assert_eq!(frames.len(), 2);
-    assert_eq!(frames[1], crate::frames::contacts(&snapshot));
+    // Fields come back in the order of their names.
+    let mut written = crate::frames::contacts(&snapshot);
+    written.fields.sort_by(|a, b| a.name.cmp(&b.name));
+    assert_eq!(frames[1], written);
 }
