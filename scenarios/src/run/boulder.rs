@@ -6,7 +6,6 @@
 
 use super::comet_ball::{self, CometBall};
 use super::world::fragments::{self, Fragment};
-use super::world::workshop::Surroundings;
 use super::world::{Course, Expected, Ran, Recipe, Workshop, World};
 use crate::failure::Failure;
 use crate::scene::world::{Materials, OutputKeys, Place, StepKeys};
@@ -147,7 +146,7 @@ impl Recipe for BoulderScene {
             radius,
         };
         shop.trim(&ball(self.radius()), true)?;
-        let around = Surroundings::none(shop.materials.laws.clone());
+        let around = self.ball().last(origin)?;
         let relaxation = comet_ball::relaxation(shop.materials);
         shop.relax(&around, &relaxation)?;
         shop.measure(&around, &ball(0.8 * self.radius()), relaxation.acceleration)?;

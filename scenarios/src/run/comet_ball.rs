@@ -35,6 +35,8 @@ use std::f64::consts::PI;
 const STIFFER: f64 = 2.0;
 /// Time of a stage over the time in which two mean grains part, √(m d/F_c) √(depth/d).
 const OSCILLATIONS: f64 = 60.0;
+/// Drag of the pulled grains, over √(a/d): they come in slowly, so that the pull can be taken off in time.
+const DRAG: f64 = 3.0;
 /// Ball in which the solid fraction is measured, over the one that is needed.
 const PROBE: f64 = 0.8;
 
@@ -126,13 +128,7 @@ impl CometBall<'_> {
     ) -> Result<(), Failure> {
         let stiff = self.contact.youngs_modulus.unwrap_or_default();
         let mut modulus = self.preparation.youngs_modulus;
-        let materials_at = |modulus: f64| {
-            let keys = self.preparation.contact(self.contact, modulus);
-            let none = BTreeMap::new();
-            self.material
-                .materials(&keys, &none, self.coarse_graining, origin)
-        };
-        let soft = materials_at(modulus)?;
+        let soft = self.at_stiffness(modulus, origin)?;
         let first = &soft.ingredients[0];
         shop.grow(&Aggregate {
             growth: Growth::ParticleCluster,
@@ -148,13 +144,12 @@ impl CometBall<'_> {
         let mut stages = 0;
         while modulus < stiff {
             modulus = (STIFFER * modulus).min(stiff);
-            let materials = materials_at(modulus)?;
+            let materials = self.at_stiffness(modulus, origin)?;
             let unit = relaxation(&materials).acceleration;
             let time = OSCILLATIONS * (diameter(&materials) * depth(&materials) / unit).sqrt();
             shop.let_go(&Surroundings::none(materials.laws), time)?;
             stages += 1;
         }
-        let last = Surroundings::none(materials_at(stiff)?.laws);
         shop.note(
             "stiffen",
             format!(
@@ -163,8 +158,25 @@ impl CometBall<'_> {
             ),
         );
         let own = relaxation(shop.materials);
-        shop.relax(&last, &own)?;
+        shop.relax(&self.last(origin)?, &own)?;
         shop.place(UnitQuaternion::identity(), center)
+    }
+
+    /// The law under which a preparation ends: as stiff as the scene's own, with the preparation's
+    /// restitution, so that the packing does not depend on the restitution that is tested.
+    pub fn last(&self, origin: &str) -> Result<Surroundings, Failure> {
+        let stiff = self.contact.youngs_modulus.unwrap_or_default();
+        let materials = self.at_stiffness(stiff, origin)?;
+        Ok(Surroundings::none(materials.laws))
+    }
+
+    /// The materials while the ball is made, at this E (Pa).
+    fn at_stiffness(&self, modulus: f64, origin: &str) -> Result<Materials, Failure> {
+        let keys = self.preparation.contact(self.contact, modulus);
+        let none = BTreeMap::new();
+        Ok(self
+            .material
+            .materials(&keys, &none, self.coarse_graining, origin)?)
     }
 
     /// Gives grains their materials, so that the parts by volume are met to one grain.
@@ -198,11 +210,11 @@ impl CometBall<'_> {
             tolerance: 0.02,
             accelerations: [acceleration, 1000.0 * acceleration],
             relaxation: Relaxation {
-                damping: 0.5,
+                damping: DRAG,
                 patience: 500.0,
                 rest: Rest {
-                    kinetic: 1e-4,
-                    unbalanced: 0.05,
+                    kinetic: 1e-3,
+                    unbalanced: 0.1,
                 },
                 ..Relaxation::under(acceleration)
             },

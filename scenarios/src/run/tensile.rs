@@ -8,7 +8,6 @@
 
 use super::comet_ball::{self, CometBall};
 use super::world::fragments;
-use super::world::workshop::Surroundings;
 use super::world::{Course, Expected, Ran, Recipe, Workshop, World};
 use crate::failure::Failure;
 use crate::scene::world::{Materials, OutputKeys, Place, StepKeys};
@@ -264,11 +263,10 @@ impl Recipe for TensileScene {
     fn prepare(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure> {
         let middle = Vector3::new(0.0, 0.0, 0.5 * self.sample.height);
         self.ball().make(shop, middle, origin)?;
-        let laws = shop.materials.laws.clone();
         let diameter = comet_ball::diameter(shop.materials);
         let relaxation = comet_ball::relaxation(shop.materials);
         shop.trim(&self.shape(), false)?;
-        let mut around = Surroundings::none(laws);
+        let mut around = self.ball().last(origin)?;
         match self.clamp.kind {
             ClampKind::Gripped => {
                 shop.glue(&self.gripped(diameter))?;

@@ -10,7 +10,7 @@
 use super::world::{
     GrainMaterialKeys, Materials, Place, SizeKeys, SizeKind, SurfaceKeys, materials,
 };
-use super::{LawKeys, SceneError};
+use super::{CohesionKind, LawKeys, SceneError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -117,12 +117,17 @@ impl CometPreparationKeys {
             origin,
             section: "preparation",
         };
+        let law = Place {
+            origin,
+            section: "contact",
+        };
+        let cohesion = contact.parts().cohesion;
+        if cohesion == CohesionKind::None {
+            let range = "one that holds the grains together: dmt, scheeres or constant";
+            return Err(law.refuse("cohesion", cohesion.word(), range));
+        }
         let stiff = contact.youngs_modulus.ok_or_else(|| {
-            let at = Place {
-                origin,
-                section: "contact",
-            };
-            at.missing(
+            law.missing(
                 "youngs_modulus",
                 "E in Pa: grains are made softer while they are put in place",
             )

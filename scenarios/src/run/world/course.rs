@@ -119,7 +119,8 @@ fn make(recipe: &dyn Recipe, materials: &Materials, under: &Under) -> Result<Sto
     let seed = recipe.seed();
     let keys = (seed, recipe.step().preparation);
     let threads = under.threads_of_one_run();
-    let mut shop = Workshop::new(materials, keys, threads, &mut watch);
+    let shop = Workshop::new(materials, keys, threads, &mut watch);
+    let mut shop = shop.tell(&under.directory.journal);
     let made = recipe.prepare(&mut shop, &under.scene.origin);
     let (packing, notes, grain_steps) = (shop.packing, shop.notes, shop.grain_steps);
     bar.clear();
@@ -127,10 +128,6 @@ fn make(recipe: &dyn Recipe, materials: &Materials, under: &Under) -> Result<Sto
         return Err(under.interrupted());
     }
     made?;
-    for note in &notes {
-        let line = format!("{}: {}", note.step, note.text.replace('\n', "; "));
-        under.directory.journal.note(&line);
-    }
     Ok(Stored {
         packing,
         materials: materials.names.clone(),

@@ -4,6 +4,7 @@
 //! and takes it back. It has a time step of its own, from its own speeds.
 
 use crate::failure::Failure;
+use crate::journal::Journal;
 use crate::scene::world::Materials;
 use crate::summary::Note;
 use colluvium_dem::preparation::{
@@ -35,6 +36,7 @@ pub struct Workshop<'a> {
     pub safety: f64,
     /// How steps are shared out.
     pub threads: Threads,
+    journal: Option<&'a Journal>,
     watch: &'a mut dyn FnMut(&RestMeasures) -> ControlFlow<()>,
 }
 
@@ -163,16 +165,27 @@ impl<'a> Workshop<'a> {
             seed,
             safety,
             threads,
+            journal: None,
             watch,
         }
     }
 
+    /// Notes go into a journal as they come.
+    pub fn tell(mut self, journal: &'a Journal) -> Workshop<'a> {
+        self.journal = Some(journal);
+        self
+    }
+
     /// Writes down what a step achieved.
     pub fn note(&mut self, step: &str, text: impl ToString) {
-        self.notes.push(Note {
+        let note = Note {
             step: step.to_owned(),
             text: text.to_string(),
-        });
+        };
+        if let Some(journal) = self.journal {
+            journal.note(&format!("{step}: {}", note.text.replace('\n', "; ")));
+        }
+        self.notes.push(note);
     }
 
     /// The packing among its surroundings, at rest or as it moves.

@@ -1,0 +1,194 @@
+//! Scenes of cometary material in small: the tensile test and the boulder drop.
+
+#![allow(clippy::unwrap_used)] // a test may panic
+
+mod command;
+
+use command::{colluvium, succeed, summary, table, value};
+use serde_json::Value;
+use std::path::Path;
+
+fn run<'a>(scene: &'a str, out: &'a str, sets: &[&'a str]) -> Vec<&'a str> {
+    let mut list = vec!["run", scene, "--out", out];
+    for set in sets {
+        list.extend(["--set", set]);
+    }
+    list
+}
+
+/// Number after a word in the note of a step of the preparation.
+fn noted(summary: &Value, step: &str, word: &str) -> f64 {
+    let notes = summary["preparation"].as_array().unwrap();
+    let note = notes.iter().rfind(|note| note["step"] == step).unwrap();
+    let text = note["text"].as_str().unwrap();
+    let after = text.split(word).nth(1).unwrap().trim_start();
+    after.split_whitespace().next().unwrap().parse().unwrap()
+}
+
+/// A sample of some 250 parcels.
+const SMALL: [&str; 4] = [
+    "coarse_graining=6",
+    "preparation.margin=1.1",
+    "pull.rate=1",
+    "packing=dust",
+];
+
+#[test]
+fn a_small_sample_breaks_at_a_stress_of_the_papers_order() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    succeed(folder.path(), &run("tensile-test", "one", &SMALL));
+    let found = summary(&at("one"));
+    // Porosity 73 % of the ball that it is cut out of, a network that hangs together.
+    let solid = noted(&found, "compact", "solid fraction");
+    assert!((solid / 0.269 - 1.0).abs() < 0.02, "{solid}");
+    let coordination = value(&found, "coordination");
+    assert!((1.9..3.0).contains(&coordination), "{coordination}");
+    // Kappel et al. (2020): 2.25 Pa, from samples some hundred times as large.
+    let strength = value(&found, "strength");
+    assert_eq!(
+        found["results"]["strength"]["reference"].as_f64(),
+        Some(2.25)
+    );
+    assert!((0.5..4.5).contains(&strength), "{strength}");
+    // The clamp feels what is applied, until the sample gives way; then most of it no longer arrives.
+    let (header, rows) = table(&at("one").join("history.csv"));
+    let column = |name: &str| header.iter().position(|n| n == name).unwrap();
+    let (applied, clamp) = (column("applied_stress"), column("clamp_stress"));
+    let last = rows.last().unwrap();
+    assert!(last[applied] > 2.0 * last[clamp] && last[applied] > strength);
+    assert!(last[column("vz")] < 0.0);
+    let applied_then = value(&found, "applied_stress_at_failure");
+    assert!(applied_then >= strength, "{applied_then} {strength}");
+    // A pull that ends early leaves the same sample whole, and the scene says so.
+    let weak = [&SMALL[..], &["pull.limit=0.03"]].concat();
+    succeed(folder.path(), &run("tensile-test", "whole", &weak));
+    let whole = summary(&at("whole"));
+    assert!(
+        whole["remarks"][0]
+            .as_str()
+            .unwrap()
+            .contains("lower bound")
+    );
+    assert!(value(&whole, "strength") < strength);
+}
+
+/// A boulder of some 200 parcels for a few seconds.
+const BOULDER: [&str; 4] = [
+    "coarse_graining=150",
+    "preparation.margin=1.1",
+    "impact.duration=6",
+    "output.frames=0",
+];
+
+#[test]
+fn small_grains_survive_the_fall_that_large_ones_do_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let held = |name: &str, sets: &[&str]| {
+        let sets = [&BOULDER[..], sets].concat();
+        succeed(folder.path(), &run("boulder-drop", name, &sets));
+        summary(&folder.path().join(name))
+    };
+    // The same parcels stand for grains of 0.1 and of 20 mm.
+    let fine = held(
+        "fine",
+        &[
+            "material.smallest_diameter=1e-4",
+            "material.largest_diameter=2e-4",
+            "coarse_graining=1500",
+        ],
+    );
+    let coarse = held(
+        "coarse",
+        &[
+            "material.smallest_diameter=1e-2",
+            "material.largest_diameter=2e-2",
+            "coarse_graining=15",
+        ],
+    );
+    let largest = |found: &Value| value(found, "largest_fragment_share");
+    assert!(largest(&fine) > 0.8, "{}", largest(&fine));
+    assert_eq!(value(&fine, "outcome"), 2.0);
+    assert!(
+        largest(&coarse) < 0.5 * largest(&fine),
+        "{}",
+        largest(&coarse)
+    );
+    assert!(value(&coarse, "held_contact_share") < value(&fine, "held_contact_share"));
+    let fragments = folder.path().join("coarse/fragments.csv");
+    let (header, rows) = table(&fragments);
+    let share = header.iter().position(|n| n == "mass_share").unwrap();
+    assert_eq!(rows[0][share], largest(&coarse));
+    assert!(rows.iter().map(|row| row[share]).sum::<f64>() <= 1.0 + 1e-12);
+    let pictures = |out: &str| {
+        let entries = std::fs::read_dir(folder.path().join(out)).unwrap();
+        let names = entries.map(|e| e.unwrap().file_name().into_string().unwrap());
+        names.filter(|n| n.ends_with("_groups.png")).count()
+    };
+    assert_eq!(pictures("coarse"), 1);
+}
+
+#[test]
+fn what_cannot_be_made_is_refused_with_its_key() {
+    let folder = tempfile::tempdir().unwrap();
+    for (scene, set, words) in [
+        (
+            "tensile-test",
+            "contact.cohesion=none",
+            &["contact.cohesion", "dmt"][..],
+        ),
+        (
+            "tensile-test",
+            "material.bulk_density=1500",
+            &["material.bulk_density", "0.6"],
+        ),
+        (
+            "tensile-test",
+            "material.largest_diameter=1e-4",
+            &["material.largest_diameter"],
+        ),
+        (
+            "tensile-test",
+            "coarse_graining=20",
+            &["coarse_graining", "at most 6.25"],
+        ),
+        (
+            "tensile-test",
+            "clamp.height=0.06",
+            &["clamp.height", "0.05"],
+        ),
+        (
+            "tensile-test",
+            "preparation.youngs_modulus=1e9",
+            &["preparation.youngs_modulus", "100000000"],
+        ),
+        (
+            "tensile-test",
+            "material.mix=mud",
+            &["material.mix", "two-to-one"],
+        ),
+        (
+            "boulder-drop",
+            "sinter.materials=[\"mud\"]",
+            &["sinter.materials", "dust, ice"],
+        ),
+        (
+            "boulder-drop",
+            "impact.degrees=90",
+            &["impact.degrees", "90"],
+        ),
+        (
+            "boulder-drop",
+            "timestep.seconds=1",
+            &["timestep", "unstable"],
+        ),
+    ] {
+        let done = colluvium(folder.path(), &run(scene, "bad", &[set]));
+        let message = String::from_utf8_lossy(&done.stderr).into_owned();
+        assert_eq!(done.status.code(), Some(2), "{set}: {message}");
+        for word in words {
+            assert!(message.contains(word), "{set}: no `{word}` in: {message}");
+        }
+        assert!(!Path::new(folder.path()).join("bad").exists(), "{set}");
+    }
+}
