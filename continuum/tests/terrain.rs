@@ -20,16 +20,21 @@ fn space_grid(cells: [usize; 3], length: [f64; 3]) -> GridLines<3> {
     }
 }
 
+/// The index of a cell; x runs fastest.
+fn index_of<const N: usize>(lines: &GridLines<N>, number: usize) -> [usize; N] {
+    let mut rest = number;
+    lines.cells.map(|cells| {
+        let along = rest % cells;
+        rest /= cells;
+        along
+    })
+}
+
 /// Every cell closes, fractions lie between 0 and 1, and full cells are closed off.
 fn closes<const N: usize>(cut: &CutCells<N>) {
     let lines = cut.lines();
-    let mut index = [0; N];
     for number in 0..lines.count() {
-        let mut rest = number;
-        for axis in 0..N {
-            index[axis] = rest % lines.cells[axis];
-            rest /= lines.cells[axis];
-        }
+        let index = index_of(lines, number);
         let fraction = cut.volume_fraction(index);
         assert!((0.0..=1.0).contains(&fraction));
         let largest = (0..N).map(|a| lines.face_area(a)).fold(0.0, f64::max);
@@ -55,13 +60,8 @@ fn closes<const N: usize>(cut: &CutCells<N>) {
 fn wall_area<const N: usize>(cut: &CutCells<N>) -> f64 {
     let lines = cut.lines();
     let mut total = 0.0;
-    let mut index = [0; N];
     for number in 0..lines.count() {
-        let mut rest = number;
-        for axis in 0..N {
-            index[axis] = rest % lines.cells[axis];
-            rest /= lines.cells[axis];
-        }
+        let index = index_of(lines, number);
         total += cut.wall(index).map_or(0.0, |wall| wall.area);
     }
     total
