@@ -11,21 +11,21 @@ use std::time::{Duration, Instant};
 #[test]
 fn collapse_writes_front_and_deposit() {
     let folder = tempfile::tempdir().unwrap();
-    let set = ["--set", "scale=0.375", "--set", "height=0.2"];
+    let set = ["--set", "scale=0.5", "--set", "height=0.2"];
     let run = [&["run", "column-collapse", "--out", "c"], &set[..]].concat();
     succeed(folder.path(), &run);
     let (header, fronts) = table(&folder.path().join("c/front.csv"));
     assert_eq!(header, ["t", "x_front", "height"]);
     let (header, deposit) = table(&folder.path().join("c/deposit.csv"));
     assert_eq!(header, ["x", "h"]);
-    assert_eq!(deposit.len(), 48);
+    assert_eq!(deposit.len(), 64);
     // All of the column, 0.2 m high and 0.4 m wide, lies in the deposit.
     let spacing = deposit[1][0] - deposit[0][0];
     let area: f64 = deposit.iter().map(|row| row[1] * spacing).sum();
     assert!((area / 0.08 - 1.0).abs() < 1e-9, "{area}");
     // It stands at first and does not run back.
     assert!(fronts.len() > 100 && fronts[0][0] == 0.0);
-    // The edge of a grid of 48 cells is known to a cell and a half.
+    // The edge of a grid of 64 cells is known to a cell and a half.
     assert!((fronts[0][1] / 0.4 - 1.0).abs() < 0.08);
     for pair in fronts.windows(2) {
         assert!(pair[1][0] > pair[0][0] && pair[1][1] > pair[0][1] - 0.01);

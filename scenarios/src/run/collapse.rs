@@ -96,8 +96,12 @@ impl Course {
         self.last = *step;
     }
 
+    /// Takes the front down, once an instant: a run may end at one that was just seen.
     fn see_front(&mut self, collapse: &Collapse, threshold: f64) {
-        self.fronts.push(collapse.front(threshold));
+        let front = collapse.front(threshold);
+        if self.fronts.last().is_none_or(|last| last.time < front.time) {
+            self.fronts.push(front);
+        }
     }
 
     fn see_profile(&mut self, collapse: &Collapse) {
