@@ -73,7 +73,7 @@ impl SiloScene {
             materials.number(name, "wall_material", top)?;
         }
         for (k, &size) in self.openings_diameters.iter().enumerate() {
-            if !(size >= NARROWEST && size <= 1000.0) {
+            if !(NARROWEST..=1000.0).contains(&size) {
                 let range = format!("[{NARROWEST}, 1000]: narrower openings clog");
                 return Err(top.refuse(&format!("openings_diameters[{k}]"), size, range));
             }
