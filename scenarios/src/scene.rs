@@ -237,7 +237,8 @@ impl Scene {
             }
         }
         // What was written, before a file's numbers take their places.
-        let written = own.clone();
+        let mut written = own.clone();
+        friction_keys::forget_defaults(&mut written, &base);
         let mut inputs = Vec::new();
         inputs.extend(rheology_file::resolve(&mut own)?);
         let mut set = layers::parse_settings(settings, option)?;

@@ -18,6 +18,7 @@ fn strength(folder: &Path, name: &str, sets: &[&str]) -> f64 {
         out: Some(folder.join(name)),
         threads: Some(1),
         resume: false,
+        checkpoint_every: None,
     };
     let ended = run(&scene, &options).unwrap();
     let summary = report::read_summary(&ended.directory).unwrap();

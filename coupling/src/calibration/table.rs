@@ -84,9 +84,10 @@ mod tests {
 
     #[test]
     fn falling_stretches_are_pooled_and_falling_laws_have_no_table() {
+        // Falls between x = 0.30 and 0.70.
         let hump = |k: i32| {
             let x = f64::from(k) / 40.0;
-            0.3 + x - 2.0 * x * x + 1.4 * x * x * x
+            0.3 + x - 2.4 * x * x + 1.6 * x * x * x
         };
         let points: Vec<LocalPoint> = (0..40).map(|k| point(f64::from(k), hump(k))).collect();
         let table = friction_table(&points).unwrap();

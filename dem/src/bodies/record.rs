@@ -33,7 +33,8 @@ impl Bodies {
         walls: &mut [Standing],
         step: [f64; 2],
     ) -> Result<(), String> {
-        if self.is_empty() && !record.numbers.contains_key("bodies/state") {
+        let known = |name: &String| name.starts_with("bodies/");
+        if self.is_empty() && !record.numbers.keys().any(known) {
             return Ok(());
         }
         let sized = |name: &str, each: usize, count: usize| {

@@ -52,6 +52,18 @@ pub fn chooses(layer: &Table) -> bool {
     layers::get(layer, "rheology.law").is_some()
 }
 
+/// Takes out of what was written the numbers of laws that repeat a default: a copy of a bundled scene has
+/// them all.
+pub fn forget_defaults(written: &mut Table, defaults: &Table) {
+    let Some(Value::Table(rheology)) = written.get_mut("rheology") else {
+        return;
+    };
+    rheology.retain(|key, value| {
+        !LAW_KEYS.contains(&key)
+            || layers::get(defaults, &format!("rheology.{key}")) != Some(&*value)
+    });
+}
+
 /// Refuses numbers that a layer has and the law of the merged table does not read.
 pub fn check_read(table: &Table, layer: &Table, file: &str) -> Result<(), SceneError> {
     let law = chosen(table);
