@@ -47,7 +47,7 @@ pub(super) fn all(walls: &[Standing], rigid: &[Rigid], feelers: &[Feelers]) -> V
     };
     let told = |owner: usize| owner < fixed || rigid[owner - fixed].is_driven();
     let mut found: Vec<([usize; 2], Encounter)> = Vec::new();
-    for prober in 0..walls.len() {
+    for (prober, own) in feelers.iter().enumerate().take(walls.len()) {
         for target in 0..walls.len() {
             let owners = [owner(prober), owner(target)];
             if owners[0] == owners[1] || owners.iter().all(|&o| told(o)) {
@@ -56,7 +56,7 @@ pub(super) fn all(walls: &[Standing], rigid: &[Rigid], feelers: &[Feelers]) -> V
             let shapes = [prober, target].map(|k| &walls[k].wall.shape);
             // Of two balls the first one feels.
             let spare = is_ball(shapes[1]) && (!is_ball(shapes[0]) || prober > target);
-            if spare || feelers[prober].points.is_empty() {
+            if spare || own.points.is_empty() {
                 continue;
             }
             let (kind, flat) = needs(shapes[1]);

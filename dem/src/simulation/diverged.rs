@@ -111,7 +111,7 @@ impl Simulation {
             });
         }
         let mut bodies = self.bodies.rigid.iter();
-        let lost = |x: &f64| !(x.abs() < 1e150);
+        let lost = |x: &f64| x.is_nan() || x.abs() >= 1e150;
         if let Some(body) = bodies.position(|body| body.state().iter().any(lost)) {
             return Err(Diverged::Lost {
                 body,
