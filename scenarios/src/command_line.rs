@@ -80,7 +80,7 @@ enum Command {
         threads: Option<u16>,
     },
     /// Fields of grains that lie in files: density, velocity, stress, temperature, fabric, spin, couple stress
-    CoarseGrain(CoarseGrainArguments),
+    CoarseGrain(Box<CoarseGrainArguments>),
     /// Run the suites with references and write one report of how far off each figure is
     Validate {
         /// Suite: incline [default: all]
@@ -245,7 +245,7 @@ impl CoarseGrainArguments {
         });
         let points = self.point.iter().map(|text| numbers("--point", text));
         let points: Vec<[f64; 3]> = points.collect::<Result<_, _>>()?;
-        if (self.geometry == "points") != !points.is_empty() {
+        if (self.geometry == "points") == points.is_empty() {
             let why = "--point belongs to --geometry points, which needs at least one";
             return Err(Failure::Input(why.into()));
         }

@@ -50,7 +50,8 @@ impl Smoothing {
     /// A kernel of the given shape; `width` (m) is the radius of the support, of Gauss' kernel the standard
     /// deviation. `dimensions` from 1 to 3. `None` for anything else.
     pub fn new(shape: Shape, width: f64, dimensions: usize) -> Option<Self> {
-        if !(width > 0.0 && width.is_finite()) || !(1..=3).contains(&dimensions) {
+        let is_width = width > 0.0 && width.is_finite();
+        if !(is_width && (1..=3).contains(&dimensions)) {
             return None;
         }
         // ∫ w dV of the support of radius 1.

@@ -44,7 +44,7 @@ pub(super) fn parse(bytes: &[u8]) -> Result<HeightRaster, String> {
         return Err("positions in degrees; wanted: a map projection in metres".into());
     }
     let spacing = [scale[0], scale[1]];
-    if let Some(bad) = spacing.iter().find(|s| !(**s > 0.0)) {
+    if let Some(bad) = spacing.iter().find(|s| s.is_nan() || **s <= 0.0) {
         return Err(format!(
             "pixel scale {bad} is not allowed; allowed: greater than 0 m"
         ));
