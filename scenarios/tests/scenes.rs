@@ -4,6 +4,7 @@
 
 mod command;
 
+use colluvium::scene::BUNDLED;
 use command::{colluvium, succeed, summary, table, value};
 use std::f64::consts::PI;
 
@@ -258,7 +259,7 @@ fn every_bundled_scene_can_be_listed_shown_checked_and_planned() {
             assert!(plan.contains(topic), "{name}: {plan}");
         }
     }
-    assert_eq!(list.lines().count(), 8);
+    assert_eq!(list.lines().count(), BUNDLED.len());
 }
 
 #[test]
@@ -266,7 +267,7 @@ fn the_schema_is_json_and_knows_every_scene() {
     let folder = tempfile::tempdir().unwrap();
     let text = succeed(folder.path(), &["schema"]);
     let schema: serde_json::Value = serde_json::from_str(&text).unwrap();
-    assert_eq!(schema["oneOf"].as_array().unwrap().len(), 8);
+    assert_eq!(schema["oneOf"].as_array().unwrap().len(), BUNDLED.len());
     // Every reference leads somewhere.
     for part in text.split("\"$ref\": \"#").skip(1) {
         let pointer = part.split('"').next().unwrap();

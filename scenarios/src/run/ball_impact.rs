@@ -28,9 +28,9 @@ const QUIET: Rest = Rest {
 const SETTLING: f64 = 3.5;
 
 /// The benchmark's own bed, from the places of its 25 000 grains (Dosta et al., Comput. Phys. Commun. 296
-/// (2024) 109066, case 3): solid fraction from 4 to 24 mm above the floor, between walls 98 mm and 60 mm
-/// apart, and contacts of a grain.
-const PUBLISHED_BED: [f64; 2] = [0.572, 4.31];
+/// (2024) 109066, case 3): solid fraction between an eighth and three quarters of its depth, between walls 98 mm and 60 mm
+/// apart, and contacts of a grain, those with walls included.
+const PUBLISHED_BED: [f64; 2] = [0.570, 4.40];
 
 impl BallImpactScene {
     fn walls(&self, materials: &Materials, origin: &str) -> Result<Vec<(String, Wall)>, Failure> {
@@ -236,6 +236,10 @@ impl Recipe for BallImpactScene {
     }
 
     fn world(&self, _: &Packing, materials: &Materials, origin: &str) -> Result<World, Failure> {
+        // A bed that cannot be read is found before anything is written.
+        if let Some(path) = &self.bed {
+            self.given_bed(path, materials)?;
+        }
         let fall = self.scale * (self.ball.height - self.container.floor);
         Ok(World {
             gravity: self.down(),

@@ -28,7 +28,7 @@ pub struct SiloScene {
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10000.0))]
     pub duration: f64,
     /// Magnitude of gravity (m/s²).
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
+    #[schemars(extend("minimum" = 1.0e-9, "maximum" = 1000.0))]
     pub gravity: f64,
     /// Seed of the fillings.
     #[schemars(extend("minimum" = 0, "maximum" = 9007199254740991_i64))]
@@ -73,7 +73,7 @@ impl SiloScene {
             materials.number(name, "wall_material", top)?;
         }
         for (k, &size) in self.openings_diameters.iter().enumerate() {
-            if !(size >= NARROWEST && size <= 1000.0) {
+            if !(NARROWEST..=1000.0).contains(&size) {
                 let range = format!("[{NARROWEST}, 1000]: narrower openings clog");
                 return Err(top.refuse(&format!("openings_diameters[{k}]"), size, range));
             }
