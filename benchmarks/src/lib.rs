@@ -27,6 +27,7 @@ pub fn sheared_bed(
         law: law.into(),
         grains: bed.grains,
         walls: Vec::new(),
+        bodies: Vec::new(),
         timestep: step(),
         threads,
     })?;

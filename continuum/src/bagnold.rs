@@ -17,6 +17,8 @@
 //! G(y) = (2/3)(A/B) y³ − 2 b (1 + A/B) [y/B − √(b/B³) atan(y √(B/b))].
 //! ```
 //!
+//! For any law, γ̇ is the rate at which it bears τ under p, and u its integral over depth.
+//!
 //! Up to tanθ = μ_s the layer rests; from μ_2 on there is no steady state. Sources: GDR MiDi,
 //! *Eur. Phys. J. E* 14 (2004) 341; Lagrée, Staron & Popinet, *J. Fluid Mech.* 686 (2011) 378.
 
@@ -26,8 +28,9 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, require};
 use crate::grid::Boundary;
-use crate::layer::{Layer, LayerRun, LayerSolution, Options, Progress};
-use crate::rheology::MuI;
+use crate::layer::{Layer, LayerRun, LayerSolution, Options, Progress, validate_grid};
+use crate::rheology::shear_law::integral;
+use crate::rheology::{MuI, ShearLaw};
 use crate::units::Units;
 
 /// Steady flow on an incline, with exact solution.
@@ -36,7 +39,7 @@ pub type BagnoldSolution = LayerSolution;
 /// A layer on a rough incline.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct BagnoldCase {
+pub struct BagnoldCase<L = MuI> {
     /// Slope θ (rad).
     pub slope: f64,
     /// Depth h of the layer, normal to the incline (m).
@@ -44,7 +47,7 @@ pub struct BagnoldCase {
     /// Gravity g (m/s²).
     pub gravity: f64,
     /// The material.
-    pub rheology: MuI,
+    pub rheology: L,
     /// Cells across the depth.
     pub cells: usize,
     /// Columns of a periodic grid of square cells; none computes a flow that does not vary
@@ -53,7 +56,7 @@ pub struct BagnoldCase {
     pub columns: Option<usize>,
 }
 
-impl BagnoldCase {
+impl<L: ShearLaw> BagnoldCase<L> {
     /// Refuses parameters out of range, among them slopes without steady state.
     ///
     /// # Errors
@@ -72,18 +75,19 @@ impl BagnoldCase {
             self.gravity,
             "greater than 0 m/s² and finite",
         )?;
-        Layer::validate_grid(self.cells, self.columns)?;
-        let rests = self.slope.tan() <= self.rheology.mu_s;
-        let is_steady = rests || self.slope.tan() < self.rheology.mu_2;
+        validate_grid(self.cells, self.columns)?;
+        let [still, fastest] = self.rheology.friction_limits();
+        let tangent = self.slope.tan();
+        let is_steady = tangent <= still || tangent < fastest;
+        let limit = still.max(fastest);
         require(
             self.slope >= 0.0 && self.slope < std::f64::consts::FRAC_PI_2 && is_steady,
             "slope_degrees",
             self.slope.to_degrees(),
             format!(
-                "0 to below {:.4} (the angle whose tangent is rheology.mu_2 = {}): \
-                 steeper layers accelerate for ever",
-                self.rheology.mu_2.atan().to_degrees(),
-                self.rheology.mu_2
+                "0 to below {:.4} (the angle whose tangent is {limit}, the largest friction of the \
+                 law): steeper layers accelerate for ever",
+                limit.atan().to_degrees(),
             ),
         )
     }
@@ -105,11 +109,11 @@ impl BagnoldCase {
 
     /// Thickness of the rigid plug under the surface (m): 0 without cohesion, the depth at rest.
     pub fn plug_thickness(&self) -> f64 {
-        let excess = self.slope.tan() - self.rheology.mu_s;
+        let excess = self.slope.tan() - self.rheology.friction_limits()[0];
         if excess <= 0.0 {
             return self.depth;
         }
-        (self.rheology.cohesion / (self.normal_weight() * excess)).min(self.depth)
+        (self.rheology.cohesion() / (self.normal_weight() * excess)).min(self.depth)
     }
 
     /// Exact velocity (m/s) at height z (m) above the base.
@@ -118,22 +122,15 @@ impl BagnoldCase {
         if plug >= self.depth {
             return 0.0;
         }
-        let law = &self.rheology;
-        let excess = self.slope.tan() - law.mu_s;
-        let margin = law.mu_2 - self.slope.tan();
-        let b = law.cohesion / self.normal_weight();
-        let antiderivative = |y: f64| {
-            let bagnold = 2.0 / 3.0 * excess / margin * y.powi(3);
-            if b == 0.0 {
-                return bagnold;
-            }
-            let turn = (b / margin.powi(3)).sqrt() * (y * (margin / b).sqrt()).atan();
-            bagnold - 2.0 * b * (1.0 + excess / margin) * (y / margin - turn)
-        };
-        let rate =
-            law.i_0 / law.diameter * (law.solid_fraction * self.gravity * self.slope.cos()).sqrt();
         let below_surface = (self.depth - z).clamp(plug, self.depth);
-        rate * (antiderivative(self.depth.sqrt()) - antiderivative(below_surface.sqrt()))
+        // In y = √ζ the integrand is smooth at the surface.
+        integral(below_surface.sqrt(), self.depth.sqrt(), |y| {
+            let pressure = self.normal_weight() * y * y;
+            2.0 * y
+                * self
+                    .rheology
+                    .rate_under(pressure * self.slope.tan(), pressure)
+        })
     }
 
     /// Natural units of the computation: depth, bulk density, √(g h).
@@ -160,7 +157,7 @@ impl BagnoldCase {
     ///
     /// # Errors
     /// Parameters out of range.
-    pub fn begin(&self, options: &Options) -> Result<LayerRun, Error> {
+    pub fn begin(&self, options: &Options) -> Result<LayerRun<L>, Error> {
         self.validate()?;
         let layer = Layer {
             units: self.units(),
@@ -172,13 +169,14 @@ impl BagnoldCase {
                 self.gravity * self.slope.sin(),
                 -self.gravity * self.slope.cos(),
             ],
-            rheology: self.rheology,
+            rheology: &self.rheology,
+            side_walls: None,
         };
         layer.begin(options, &|z| self.exact_pressure(z))
     }
 
     /// A run's flow as it is, beside the exact solution.
-    pub fn solution(&self, run: &LayerRun) -> BagnoldSolution {
+    pub fn solution(&self, run: &LayerRun<L>) -> BagnoldSolution {
         run.solution(|z| self.exact_velocity(z), |z| self.exact_pressure(z))
     }
 }

@@ -8,6 +8,7 @@
 //! dissipated power.
 
 use crate::grid::{Axis, Boundary, DIMENSIONS, Grid};
+use crate::wall_friction::{PointLaw, SideWalls};
 
 /// Components of the strain rate (and of the deviatoric stress) in a plane flow.
 pub const COMPONENTS: usize = 2;
@@ -42,12 +43,16 @@ pub struct QuadraturePoint {
     pressures: [usize; MAX_PRESSURES],
     pressure_count: usize,
     pressure_weights: [f64; MAX_PRESSURES],
+    /// Part of the threshold pressure that is known beforehand.
+    pub(crate) pressure_offset: f64,
     /// The boundary across z on which the corner lies: 0 low, 1 high.
     pub(crate) side: Option<usize>,
+    /// Whose threshold holds here.
+    pub(crate) law: PointLaw,
 }
 
 impl QuadraturePoint {
-    fn new(weight: f64) -> Self {
+    pub(crate) fn new(weight: f64) -> Self {
         Self {
             weight,
             velocities: [0; MAX_VELOCITIES],
@@ -57,11 +62,13 @@ impl QuadraturePoint {
             pressures: [0; MAX_PRESSURES],
             pressure_count: 0,
             pressure_weights: [0.0; MAX_PRESSURES],
+            pressure_offset: 0.0,
             side: None,
+            law: PointLaw::Material,
         }
     }
 
-    fn add_velocity(&mut self, unknown: usize, component: usize, coefficient: f64) {
+    pub(crate) fn add_velocity(&mut self, unknown: usize, component: usize, coefficient: f64) {
         let known = &self.velocities[..self.velocity_count];
         let slot = known
             .iter()
@@ -74,10 +81,17 @@ impl QuadraturePoint {
         self.rates[component][slot] += coefficient;
     }
 
-    fn add_pressure(&mut self, cell: usize, weight: f64) {
-        self.pressures[self.pressure_count] = cell;
-        self.pressure_weights[self.pressure_count] = weight;
-        self.pressure_count += 1;
+    pub(crate) fn add_pressure(&mut self, cell: usize, weight: f64) {
+        let known = &self.pressures[..self.pressure_count];
+        let slot = known
+            .iter()
+            .position(|&c| c == cell)
+            .unwrap_or(self.pressure_count);
+        if slot == self.pressure_count {
+            self.pressures[slot] = cell;
+            self.pressure_count += 1;
+        }
+        self.pressure_weights[slot] += weight;
     }
 
     /// The velocities that the point depends on.
@@ -122,8 +136,18 @@ impl QuadraturePoint {
     /// Threshold pressure, not yet cut at zero.
     #[inline]
     pub(crate) fn pressure(&self, p: &[f64]) -> f64 {
+        self.pressure_offset + self.pressure_change(p)
+    }
+
+    /// Threshold pressure of a change of pressure.
+    #[inline]
+    pub(crate) fn pressure_change(&self, p: &[f64]) -> f64 {
         let (cells, weights) = self.pressures();
-        cells.iter().zip(weights).map(|(&c, w)| w * p[c]).sum()
+        cells
+            .iter()
+            .zip(weights)
+            .map(|(&c, w)| w * p[c])
+            .sum::<f64>()
     }
 }
 
@@ -133,8 +157,25 @@ pub struct Discretisation {
     grid: Grid,
     points: Vec<QuadraturePoint>,
     mass: Vec<f64>,
+    /// Component of each velocity.
+    components: Vec<usize>,
     divergence: Vec<(usize, usize, f64)>,
+    /// For each entry of the divergence, the force of the cell's pressure on the velocity.
+    gradient: Vec<f64>,
     boundary_load: Vec<f64>,
+    cells: usize,
+}
+
+/// The parts of [`Discretisation`] that depend on where the material lies.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Parts {
+    pub points: Vec<QuadraturePoint>,
+    pub mass: Vec<f64>,
+    pub components: Vec<usize>,
+    pub divergence: Vec<(usize, usize, f64)>,
+    pub gradient: Vec<f64>,
+    pub boundary_load: Vec<f64>,
+    pub cells: usize,
 }
 
 impl Discretisation {
@@ -178,13 +219,65 @@ impl Discretisation {
                 }
             }
         }
+        let parts = Parts {
+            points,
+            mass,
+            components: (0..DIMENSIONS)
+                .flat_map(|c| std::iter::repeat_n(c, grid.component(c).len()))
+                .collect(),
+            gradient: divergence.iter().map(|&(_, _, area)| area).collect(),
+            divergence,
+            boundary_load,
+            cells: grid.cells(),
+        };
+        Self::of_parts(grid, parts)
+    }
+
+    /// The operators of material that fills part of a grid.
+    pub(crate) fn of_parts(grid: Grid, parts: Parts) -> Self {
+        let Parts {
+            points,
+            mass,
+            components,
+            divergence,
+            gradient,
+            boundary_load,
+            cells,
+        } = parts;
         Self {
             grid,
             points,
             mass,
+            components,
             divergence,
+            gradient,
             boundary_load,
+            cells,
         }
+    }
+
+    /// What decides where the matrix has coefficients.
+    pub(crate) fn pattern(&self) -> Vec<usize> {
+        let mut pattern = vec![self.velocities(), self.cells];
+        for &(cell, velocity, _) in &self.divergence {
+            pattern.extend([cell, velocity]);
+        }
+        for point in &self.points {
+            pattern.extend([point.velocity_count, point.pressure_count]);
+            pattern.extend(point.velocities());
+            pattern.extend(point.pressures().0);
+        }
+        pattern
+    }
+
+    /// Number of unknown velocities.
+    pub fn velocities(&self) -> usize {
+        self.mass.len()
+    }
+
+    /// Number of unknown pressures.
+    pub fn cells(&self) -> usize {
+        self.cells
     }
 
     /// The grid.
@@ -202,20 +295,66 @@ impl Discretisation {
         &self.mass
     }
 
+    /// Component of an unknown velocity.
+    pub(crate) fn component_of(&self, velocity: usize) -> usize {
+        self.components[velocity]
+    }
+
     /// The divergence, integrated over cells, as entries (cell, velocity, signed face area).
     pub(crate) fn divergence(&self) -> &[(usize, usize, f64)] {
         &self.divergence
     }
 
-    /// Force of a body acceleration and of the pressure outside the grid on each velocity.
-    pub fn load(&self, acceleration: [f64; DIMENSIONS]) -> Vec<f64> {
-        let mut load = self.boundary_load.clone();
-        for (component, a) in acceleration.iter().enumerate() {
-            for unknown in self.grid.component(component) {
-                load[unknown] += a * self.mass[unknown];
+    /// Adds the friction of side walls: points that take the velocity for a rate, one for each pair of
+    /// a face across x and one across z of a cell.
+    pub(crate) fn add_side_walls(&mut self, walls: SideWalls) {
+        let grid = &self.grid;
+        let [columns, rows] = [grid.axes()[0].cells(), grid.axes()[1].cells()];
+        let faces_of = |axis: usize, cell: usize| match grid.axes()[axis].faces_of_cell(cell) {
+            None => vec![0],
+            Some(pair) => pair.to_vec(),
+        };
+        for cell in (0..rows).flat_map(|k| (0..columns).map(move |i| [i, k])) {
+            let [xs, zs] = [0, 1].map(|axis| faces_of(axis, cell[axis]));
+            for (&fx, &fz) in xs.iter().flat_map(|x| zs.iter().map(move |z| (x, z))) {
+                let mut point =
+                    QuadraturePoint::new(grid.cell_volume() / (xs.len() * zs.len()) as f64);
+                for (component, face) in [(0, [fx, cell[1]]), (1, [cell[0], fz])] {
+                    if let Some(unknown) = grid.unknown(component, face) {
+                        point.add_velocity(unknown, component, 1.0);
+                    }
+                }
+                point.add_pressure(grid.cell(cell), 1.0);
+                point.law = PointLaw::SideWalls(walls);
+                self.points.push(point);
             }
         }
-        load
+    }
+
+    /// Superposes a uniform strain rate (γ₁, γ₂) on that of the unknown velocities, which are then
+    /// those of a disturbance.
+    pub(crate) fn add_uniform_strain_rate(&mut self, rate: [f64; COMPONENTS]) {
+        for point in &mut self.points {
+            for (offset, rate) in point.offset.iter_mut().zip(rate) {
+                *offset += rate;
+            }
+        }
+    }
+
+    /// The force of the pressure: for each entry of the divergence, force per pressure. It is the
+    /// signed area again, except next to a surface inside the grid.
+    pub(crate) fn gradient(&self) -> &[f64] {
+        &self.gradient
+    }
+
+    /// Force of a body acceleration and of the pressure outside the grid on each velocity.
+    pub fn load(&self, acceleration: [f64; DIMENSIONS]) -> Vec<f64> {
+        self.boundary_load
+            .iter()
+            .zip(&self.mass)
+            .zip(&self.components)
+            .map(|((load, mass), &component)| load + acceleration[component] * mass)
+            .collect()
     }
 }
 
@@ -259,20 +398,47 @@ fn push_points(
                     point.add_velocity(unknown, 0, rate);
                 }
             }
-            add_corner_shear(grid, [fx, fz], &mut point);
+            let velocity_at = |component: usize, face| {
+                let unknown = grid.unknown(component, face);
+                unknown.map_or(VelocityAt::Zero, VelocityAt::Unknown)
+            };
+            add_corner_shear(grid, velocity_at, [fx, fz], &mut point);
             match threshold_pressure {
                 ThresholdPressure::Corner => add_corner_pressure(grid, [fx, fz], &mut point),
                 ThresholdPressure::Cell => point.add_pressure(grid.cell(cell), 1.0),
             }
             point.side = grid.axes()[1].boundary_at(fz).map(|_| usize::from(fz > 0));
+            for (axis, face) in [(0, fx), (1, fz)] {
+                if let Some(Boundary::CoulombWall { friction, .. }) =
+                    grid.axes()[axis].boundary_at(face)
+                {
+                    point.law = PointLaw::OnWall(friction);
+                }
+            }
             points.push(point);
         }
     }
 }
 
+/// What an operator finds on a face.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(crate) enum VelocityAt {
+    /// An unknown.
+    Unknown(usize),
+    /// A wall.
+    Zero,
+    /// No material near: there is no velocity to take a difference with.
+    Nowhere,
+}
+
 /// Adds γ₂ = ∂u/∂z + ∂w/∂x at a corner. A rough wall acts through a mirrored velocity outside it;
 /// where a side of the corner cannot hold shear, γ₂ is left at zero and carries no stress.
-fn add_corner_shear(grid: &Grid, corner: [usize; DIMENSIONS], point: &mut QuadraturePoint) {
+pub(crate) fn add_corner_shear(
+    grid: &Grid,
+    velocity_at: impl Fn(usize, [usize; DIMENSIONS]) -> VelocityAt,
+    corner: [usize; DIMENSIONS],
+    point: &mut QuadraturePoint,
+) {
     let axes = grid.axes();
     let smooth = |axis: usize| {
         axes[axis]
@@ -292,15 +458,20 @@ fn add_corner_shear(grid: &Grid, corner: [usize; DIMENSIONS], point: &mut Quadra
         let wall = axes[along]
             .boundary_at(corner[along])
             .and_then(|side| side.wall_velocity());
-        let neighbours = axes[along].cells_at_face(corner[along]);
-        for (neighbour, sign) in neighbours.into_iter().zip([-1.0, 1.0]) {
-            let Some(position) = neighbour else { continue };
-            let mut face = corner;
-            face[along] = position;
+        let found = axes[along].cells_at_face(corner[along]).map(|position| {
+            position.map(|position| {
+                let mut face = corner;
+                face[along] = position;
+                velocity_at(component, face)
+            })
+        });
+        if found.contains(&Some(VelocityAt::Nowhere)) {
+            continue;
+        }
+        for (found, sign) in found.into_iter().zip([-1.0, 1.0]) {
             // The mirrored velocity 2 U − u doubles the difference across half a cell.
             let factor = if wall.is_some() { 2.0 } else { 1.0 };
-            let unknown = grid.unknown(component, face);
-            if let Some(unknown) = unknown {
+            if let Some(VelocityAt::Unknown(unknown)) = found {
                 point.add_velocity(unknown, 1, factor * sign * inverse);
                 point.offset[1] -= factor * sign * inverse * wall.unwrap_or(0.0);
             }

@@ -56,6 +56,14 @@ pub enum Error {
         /// The tolerance that was asked for, natural units.
         tolerance: f64,
     },
+    /// A saved state has other sizes than the grid it is to go on with.
+    #[error("the state belongs to another grid: {found} cells instead of {expected}")]
+    ForeignState {
+        /// Cells of the state.
+        found: usize,
+        /// Cells of the grid.
+        expected: usize,
+    },
     /// The sparse linear system could not be factorised.
     #[error("sparse factorisation failed: {0}")]
     LinearSolver(String),

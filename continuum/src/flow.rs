@@ -12,6 +12,7 @@ use crate::discretisation::{Discretisation, ThresholdPressure};
 use crate::error::{Error, require};
 use crate::grid::{DIMENSIONS, Grid};
 use crate::rheology::{Rheology, strain_rate_norm};
+use crate::wall_friction::{PointLaw, SideWalls};
 use crate::yield_step::{
     FlowState, PrimalDual, PrimalDualOptions, RegularisedOptions, RegularisedViscosity, Residuals,
     StepProblem, StepReport, YieldSolver,
@@ -149,6 +150,14 @@ const YIELDED: f64 = 1.0 - 1e-6;
 /// Velocity (natural units) below which changes are not measured relative to the velocity.
 const REST_VELOCITY: f64 = 1e-3;
 
+/// A value for each cell from its height.
+fn rows_of(grid: &Grid, value: impl Fn(f64) -> f64) -> Vec<f64> {
+    let [columns, rows] = [grid.axes()[0].cells(), grid.axes()[1].cells()];
+    (0..rows)
+        .flat_map(|k| std::iter::repeat_n(value(grid.centre_height(k)), columns))
+        .collect()
+}
+
 /// A flow on one grid: its state and what advances it.
 pub struct Flow<R> {
     discretisation: Discretisation,
@@ -174,11 +183,37 @@ impl<R: Rheology> Flow<R> {
         method: YieldMethod,
         pressure: impl Fn(f64) -> f64,
     ) -> Result<Self, Error> {
-        let [columns, rows] = [grid.axes()[0].cells(), grid.axes()[1].cells()];
-        let pressure = (0..rows)
-            .flat_map(|k| std::iter::repeat_n(pressure(grid.centre_height(k)), columns))
-            .collect();
+        let pressure = rows_of(&grid, pressure);
         let discretisation = Discretisation::new(grid, threshold_pressure);
+        Self::on(discretisation, rheology, acceleration, method, pressure)
+    }
+
+    /// The same between side walls (in natural units) that a plane grid does not resolve.
+    ///
+    /// # Errors
+    /// As [`at_rest`](Self::at_rest).
+    pub fn between_side_walls(
+        grid: Grid,
+        walls: SideWalls,
+        rheology: R,
+        acceleration: [f64; DIMENSIONS],
+        method: YieldMethod,
+        pressure: impl Fn(f64) -> f64,
+    ) -> Result<Self, Error> {
+        walls.validate()?;
+        let pressure = rows_of(&grid, pressure);
+        let mut discretisation = Discretisation::new(grid, ThresholdPressure::Corner);
+        discretisation.add_side_walls(walls);
+        Self::on(discretisation, rheology, acceleration, method, pressure)
+    }
+
+    fn on(
+        discretisation: Discretisation,
+        rheology: R,
+        acceleration: [f64; DIMENSIONS],
+        method: YieldMethod,
+        pressure: Vec<f64>,
+    ) -> Result<Self, Error> {
         let solver: Box<dyn YieldSolver<R>> = match method {
             YieldMethod::PrimalDual(options) => {
                 Box::new(PrimalDual::new(&discretisation, options)?)
@@ -401,7 +436,8 @@ impl<R: Rheology> Flow<R> {
         let (mut total, mut yielded, mut ill_posed) = (0.0, 0.0, 0.0);
         for (point, s) in points {
             let pressure = point.pressure(&self.state.p);
-            if pressure <= f64::EPSILON {
+            let is_material = !matches!(point.law, PointLaw::SideWalls(_));
+            if pressure <= f64::EPSILON || !is_material {
                 continue;
             }
             total += point.weight;

@@ -4,6 +4,7 @@
 //! so a third one is a longer array.
 
 use crate::error::{Error, require};
+use crate::wall_friction::WallFriction;
 
 /// Number of axes of the grid.
 pub const DIMENSIONS: usize = 2;
@@ -15,6 +16,14 @@ pub enum Boundary {
     NoSlip {
         /// Tangential velocity of the wall.
         velocity: f64,
+    },
+    /// A rigid wall along which the material slides once it bears all the shear stress it can:
+    /// Coulomb friction on a base.
+    CoulombWall {
+        /// Tangential velocity of the wall.
+        velocity: f64,
+        /// What the wall bears.
+        friction: WallFriction,
     },
     /// A rigid smooth wall, or a plane of symmetry: no normal velocity, no shear stress.
     FreeSlip,
@@ -34,7 +43,7 @@ impl Boundary {
     /// Pressure that acts from outside on the face, if the face is free to move.
     pub(crate) fn outer_pressure(&self) -> Option<f64> {
         match self {
-            Boundary::NoSlip { .. } | Boundary::FreeSlip => None,
+            Boundary::NoSlip { .. } | Boundary::CoulombWall { .. } | Boundary::FreeSlip => None,
             Boundary::FreeSurface => Some(0.0),
             Boundary::LoadedWall { pressure, .. } => Some(*pressure),
         }
@@ -43,9 +52,9 @@ impl Boundary {
     /// Tangential velocity that the boundary imposes, if it can hold a shear stress.
     pub(crate) fn wall_velocity(&self) -> Option<f64> {
         match self {
-            Boundary::NoSlip { velocity } | Boundary::LoadedWall { velocity, .. } => {
-                Some(*velocity)
-            }
+            Boundary::NoSlip { velocity }
+            | Boundary::CoulombWall { velocity, .. }
+            | Boundary::LoadedWall { velocity, .. } => Some(*velocity),
             Boundary::FreeSlip | Boundary::FreeSurface => None,
         }
     }
@@ -152,6 +161,24 @@ impl Grid {
     /// An axis without cells or without length, or boundaries that leave the pressure
     /// undetermined.
     pub fn new(axes: [Axis; DIMENSIONS]) -> Result<Self, Error> {
+        let sets_pressure = axes.iter().any(|axis| match axis {
+            Axis::Bounded { low, high, .. } => {
+                low.outer_pressure().is_some() || high.outer_pressure().is_some()
+            }
+            _ => false,
+        });
+        if !sets_pressure {
+            return Err(Error::UndeterminedPressure);
+        }
+        Self::with_moving_surface(axes)
+    }
+
+    /// Makes a grid in which the surface of the material lies somewhere inside and sets the
+    /// pressure, so the boundaries need not.
+    ///
+    /// # Errors
+    /// An axis without cells or without length.
+    pub fn with_moving_surface(axes: [Axis; DIMENSIONS]) -> Result<Self, Error> {
         for axis in &axes {
             require(
                 axis.cells() >= 1,
@@ -173,15 +200,6 @@ impl Grid {
                 axis.spacing() * axis.cells() as f64,
                 "greater than 0",
             )?;
-        }
-        let sets_pressure = axes.iter().any(|axis| match axis {
-            Axis::Bounded { low, high, .. } => {
-                low.outer_pressure().is_some() || high.outer_pressure().is_some()
-            }
-            _ => false,
-        });
-        if !sets_pressure {
-            return Err(Error::UndeterminedPressure);
         }
         let mut grid = Self {
             axes,

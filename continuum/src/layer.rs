@@ -9,8 +9,9 @@ use crate::discretisation::ThresholdPressure;
 use crate::error::{Error, require};
 use crate::flow::{Flow, March, Marching, StepRecord, YieldMethod};
 use crate::grid::{Axis, Boundary, DIMENSIONS, Grid};
-use crate::rheology::{MuI, Rheology};
+use crate::rheology::Rheology;
 use crate::units::Units;
+use crate::wall_friction::SideWalls;
 use crate::yield_step::FlowState;
 
 /// Settings of a computation, in natural units of the case (time √(H/g) in a layer of depth H).
@@ -85,14 +86,15 @@ pub struct LayerSolution {
 }
 
 /// A layer to compute; lengths, accelerations and stresses in SI units.
-pub(crate) struct Layer {
+pub(crate) struct Layer<'a, L> {
     pub units: Units,
     pub cells: usize,
     pub columns: Option<usize>,
     pub low: Boundary,
     pub high: Boundary,
     pub acceleration: [f64; DIMENSIONS],
-    pub rheology: MuI,
+    pub rheology: &'a L,
+    pub side_walls: Option<SideWalls>,
 }
 
 /// Fewest cells across a layer: a pressure is extrapolated from two.
@@ -100,25 +102,25 @@ const MIN_CELLS: usize = 2;
 /// Most cells across a layer.
 const MAX_CELLS: usize = 1 << 20;
 
-impl Layer {
-    /// Refuses grids that make no sense.
-    pub(crate) fn validate_grid(cells: usize, columns: Option<usize>) -> Result<(), Error> {
+/// Refuses grids that make no sense.
+pub(crate) fn validate_grid(cells: usize, columns: Option<usize>) -> Result<(), Error> {
+    require(
+        (MIN_CELLS..=MAX_CELLS).contains(&cells),
+        "grid.cells",
+        cells as f64,
+        format!("{MIN_CELLS} to {MAX_CELLS}"),
+    )?;
+    columns.map_or(Ok(()), |columns| {
         require(
-            (MIN_CELLS..=MAX_CELLS).contains(&cells),
-            "grid.cells",
-            cells as f64,
-            format!("{MIN_CELLS} to {MAX_CELLS}"),
-        )?;
-        columns.map_or(Ok(()), |columns| {
-            require(
-                (3..=MAX_CELLS).contains(&columns),
-                "grid.columns",
-                columns as f64,
-                format!("3 to {MAX_CELLS}, or none for a flow that does not vary along x"),
-            )
-        })
-    }
+            (3..=MAX_CELLS).contains(&columns),
+            "grid.columns",
+            columns as f64,
+            format!("3 to {MAX_CELLS}, or none for a flow that does not vary along x"),
+        )
+    })
+}
 
+impl<L: Rheology> Layer<'_, L> {
     fn boundary_in_units(&self, boundary: Boundary) -> Boundary {
         match boundary {
             Boundary::NoSlip { velocity } => Boundary::NoSlip {
@@ -127,6 +129,10 @@ impl Layer {
             Boundary::LoadedWall { velocity, pressure } => Boundary::LoadedWall {
                 velocity: velocity / self.units.velocity,
                 pressure: pressure / self.units.stress(),
+            },
+            Boundary::CoulombWall { velocity, friction } => Boundary::CoulombWall {
+                velocity: velocity / self.units.velocity,
+                friction: friction.in_units(&self.units),
             },
             Boundary::FreeSlip | Boundary::FreeSurface => boundary,
         }
@@ -150,7 +156,7 @@ impl Layer {
         &self,
         options: &Options,
         exact_pressure: &dyn Fn(f64) -> f64,
-    ) -> Result<LayerRun, Error> {
+    ) -> Result<LayerRun<L>, Error> {
         options.marching.validate()?;
         let units = self.units;
         let along = self.columns.map_or(Axis::Flat, |columns| Axis::Periodic {
@@ -163,15 +169,29 @@ impl Layer {
             low: self.boundary_in_units(self.low),
             high: self.boundary_in_units(self.high),
         };
-        let flow = Flow::at_rest(
-            Grid::new([along, across])?,
-            options.threshold_pressure,
-            self.rheology.in_units(&units),
-            self.acceleration.map(|a| a / units.acceleration()),
-            options.method,
-            // A guess from which Newton's method starts: the pressure at rest.
-            |height| exact_pressure(height * units.length) / units.stress(),
-        )?;
+        let grid = Grid::new([along, across])?;
+        let law = self.rheology.in_units(&units);
+        let acceleration = self.acceleration.map(|a| a / units.acceleration());
+        // A guess from which Newton's method starts: the pressure at rest.
+        let pressure = |height: f64| exact_pressure(height * units.length) / units.stress();
+        let flow = match self.side_walls {
+            None => Flow::at_rest(
+                grid,
+                options.threshold_pressure,
+                law,
+                acceleration,
+                options.method,
+                pressure,
+            )?,
+            Some(walls) => Flow::between_side_walls(
+                grid,
+                walls.in_units(&units),
+                law,
+                acceleration,
+                options.method,
+                pressure,
+            )?,
+        };
         Ok(LayerRun {
             units,
             cells: self.cells,
@@ -183,15 +203,15 @@ impl Layer {
 }
 
 /// A layer on its way from rest to its steady flow, step by step.
-pub struct LayerRun {
+pub struct LayerRun<L> {
     units: Units,
     cells: usize,
     marching: Marching,
     march: March,
-    flow: Flow<MuI>,
+    flow: Flow<L>,
 }
 
-impl LayerRun {
+impl<L: Rheology> LayerRun<L> {
     /// Whether the flow is steady.
     pub fn is_over(&self) -> bool {
         self.march.over

@@ -16,7 +16,9 @@
 //!
 //! # Cases with exact solutions
 //! [`bagnold`] (a layer on an incline), [`plane_shear`] (between plates under a load) and
-//! [`vertical_chute`] (between vertical walls, with a rigid plug).
+//! [`vertical_chute`] (between vertical walls, with a rigid plug), [`heap`] (a flow on a pile between
+//! side walls, over material at rest); [`plane_wave`] measures how small
+//! disturbances of a uniform flow grow or decay.
 //!
 //! ```
 //! use std::ops::ControlFlow;
@@ -39,16 +41,22 @@
 //! ```
 
 pub mod bagnold;
+pub mod column_collapse;
 pub mod discretisation;
 mod error;
 pub mod flow;
+pub mod free_surface;
 pub mod grid;
+pub mod heap;
 pub mod layer;
 pub mod linear_solver;
 pub mod plane_shear;
+pub mod plane_wave;
 pub mod rheology;
+pub mod terrain;
 pub mod units;
 pub mod vertical_chute;
+pub mod wall_friction;
 pub mod yield_step;
 
 pub use error::Error;

@@ -15,6 +15,7 @@
 mod gmres;
 mod ldlt;
 mod lu;
+mod substitution;
 
 use faer::sparse::SymbolicSparseColMat;
 
@@ -198,25 +199,46 @@ fn multiply(pattern: &SymbolicSparseColMat<usize>, values: &[f64], x: &[f64], y:
 
 /// Compressed columns of the given (row, column) pairs, and the place of each pair among them.
 fn pattern_of(size: usize, pairs: &[(usize, usize)]) -> (SymbolicSparseColMat<usize>, Vec<usize>) {
-    let mut order: Vec<usize> = (0..pairs.len()).collect();
-    order.sort_unstable_by_key(|&e| (pairs[e].1, pairs[e].0, e));
-    let mut slots = vec![0; pairs.len()];
-    let mut column_starts = vec![0; size + 1];
-    let mut rows: Vec<usize> = Vec::new();
-    let mut last = None;
-    for e in order {
-        let (row, column) = pairs[e];
-        if last != Some((row, column)) {
-            rows.push(row);
-            column_starts[column + 1] = rows.len();
-            last = Some((row, column));
-        }
-        slots[e] = rows.len() - 1;
+    // Pairs in the order of their columns, by counting.
+    let mut ends = vec![0; size + 1];
+    for &(_, column) in pairs {
+        ends[column + 1] += 1;
     }
     for column in 0..size {
-        column_starts[column + 1] = column_starts[column + 1].max(column_starts[column]);
+        ends[column + 1] += ends[column];
     }
-    let pattern = SymbolicSparseColMat::new_checked(size, size, column_starts, None, rows);
+    let mut next = ends.clone();
+    let mut order = vec![0; pairs.len()];
+    for (e, &(_, column)) in pairs.iter().enumerate() {
+        order[next[column]] = e;
+        next[column] += 1;
+    }
+    let mut slots = vec![0; pairs.len()];
+    let mut starts = vec![0; size + 1];
+    let mut rows: Vec<usize> = Vec::with_capacity(pairs.len() / 4);
+    // Where in the present column a row stands; the column it was last met in.
+    let mut place = vec![0; size];
+    let mut met_in = vec![usize::MAX; size];
+    for column in 0..size {
+        let first = rows.len();
+        let members = &order[ends[column]..ends[column + 1]];
+        for &e in members {
+            let row = pairs[e].0;
+            if met_in[row] != column {
+                met_in[row] = column;
+                rows.push(row);
+            }
+        }
+        rows[first..].sort_unstable();
+        for (offset, &row) in rows[first..].iter().enumerate() {
+            place[row] = first + offset;
+        }
+        for &e in members {
+            slots[e] = place[pairs[e].0];
+        }
+        starts[column + 1] = rows.len();
+    }
+    let pattern = SymbolicSparseColMat::new_checked(size, size, starts, None, rows);
     (pattern, slots)
 }
 

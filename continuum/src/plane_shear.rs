@@ -10,14 +10,14 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, require};
 use crate::grid::Boundary;
-use crate::layer::{Layer, LayerSolution, Options, Progress};
-use crate::rheology::{MuI, Rheology};
+use crate::layer::{Layer, LayerSolution, Options, Progress, validate_grid};
+use crate::rheology::{MuI, ShearLaw};
 use crate::units::Units;
 
 /// Material sheared between two plates.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct PlaneShearCase {
+pub struct PlaneShearCase<L = MuI> {
     /// Distance H between the plates (m).
     pub gap: f64,
     /// Velocity U of the upper plate (m/s).
@@ -25,7 +25,7 @@ pub struct PlaneShearCase {
     /// Normal stress P on the upper plate (Pa).
     pub load: f64,
     /// The material.
-    pub rheology: MuI,
+    pub rheology: L,
     /// Cells across the gap.
     pub cells: usize,
     /// Columns of a periodic grid of square cells; none computes a flow that does not vary
@@ -34,7 +34,7 @@ pub struct PlaneShearCase {
     pub columns: Option<usize>,
 }
 
-impl PlaneShearCase {
+impl<L: ShearLaw> PlaneShearCase<L> {
     /// Refuses parameters out of range.
     ///
     /// # Errors
@@ -59,7 +59,7 @@ impl PlaneShearCase {
             self.wall_velocity,
             "any finite velocity",
         )?;
-        Layer::validate_grid(self.cells, self.columns)
+        validate_grid(self.cells, self.columns)
     }
 
     /// Exact velocity (m/s) at distance z (m) from the fixed plate.
@@ -99,7 +99,8 @@ impl PlaneShearCase {
                 pressure: self.load,
             },
             acceleration: [0.0, 0.0],
-            rheology: self.rheology,
+            rheology: &self.rheology,
+            side_walls: None,
         };
         layer.solve(
             options,

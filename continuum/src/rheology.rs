@@ -4,11 +4,24 @@
 //! A material flows with τ = κ(γ̇, p) · 2D/γ̇ and stays rigid while |τ| ≤ κ(0, p), with
 //! γ̇ = √(2 D:D) and |τ| = √(½ τ:τ). The function κ, the *threshold*, and its two derivatives are
 //! all that a solver needs to know of a law.
+//!
+//! The laws, one file each: [`MuI`] with or without cohesion, [`Coulomb`] with its limits Bingham and
+//! von Mises, [`BarkerGray`], which is well posed where μ(I) is not, and [`FrictionTable`] for
+//! measured points. [`ShearLaw`] is what a law adds to have exact solutions.
 
+mod barker_gray;
+mod coulomb;
+mod friction;
 mod mu_i;
+pub(crate) mod shear_law;
+mod table;
 mod well_posedness;
 
+pub use barker_gray::BarkerGray;
+pub use coulomb::Coulomb;
 pub use mu_i::MuI;
+pub use shear_law::ShearLaw;
+pub use table::{FrictionTable, Grains};
 pub use well_posedness::well_posedness;
 
 /// Shear stress that the material bears at a strain rate and a pressure, with its derivatives.
@@ -37,7 +50,9 @@ pub trait Rheology {
 
     /// Whether the equations of motion are well posed at this strain rate and pressure (short
     /// waves do not grow at a rate without bound).
-    fn is_well_posed(&self, rate: f64, pressure: f64) -> bool;
+    fn is_well_posed(&self, rate: f64, pressure: f64) -> bool {
+        pressure > 0.0 && self.threshold(rate, pressure).is_well_posed(rate)
+    }
 
     /// The same law with lengths, densities and stresses divided by the given units.
     fn in_units(&self, units: &crate::units::Units) -> Self
@@ -55,6 +70,48 @@ pub trait Rheology {
 #[inline]
 pub fn strain_rate_norm(components: [f64; 2]) -> f64 {
     (components[0] * components[0] + components[1] * components[1]).sqrt()
+}
+
+/// What every law has to pass.
+#[cfg(test)]
+mod laws_under_test {
+    use super::*;
+    use crate::units::Units;
+
+    /// κ_γ, κ_p and Ψ′ = κ against central differences.
+    pub(super) fn derivatives_agree(law: &impl Rheology, rate: f64, pressure: f64) {
+        let exact = law.threshold(rate, pressure);
+        let step = 1e-5;
+        let difference = |f: &dyn Fn(f64) -> f64| (f(step) - f(-step)) / (2.0 * step);
+        let by_rate = difference(&|e| law.threshold(rate * (1.0 + e), pressure).stress) / rate;
+        let by_pressure =
+            difference(&|e| law.threshold(rate, pressure * (1.0 + e)).stress) / pressure;
+        let potential = difference(&|e| law.potential(rate * (1.0 + e), pressure)) / rate;
+        let near = |a: f64, b: f64| (a - b).abs() <= 1e-6 * b.abs() + 1e-9 * exact.stress / rate;
+        assert!(near(by_rate, exact.by_rate), "{by_rate} {exact:?}");
+        assert!((by_pressure - exact.by_pressure).abs() < 1e-6, "{exact:?}");
+        assert!(near(potential, exact.stress), "{potential} {exact:?}");
+    }
+
+    /// `rate_under` and κ undo each other.
+    pub(super) fn rate_inverts_the_threshold(law: &impl ShearLaw, rate: f64, pressure: f64) {
+        let stress = law.threshold(rate, pressure).stress;
+        let found = law.rate_under(stress, pressure);
+        assert!((found / rate - 1.0).abs() < 1e-9, "{found} {rate}");
+    }
+
+    /// The same stress in SI and in natural units.
+    pub(super) fn scales(law: &impl ShearLaw) {
+        let units = Units::of_gravity(3.0, law.bulk_density(), 1.8e-4);
+        let scaled = law.in_units(&units);
+        for (rate, pressure) in [(1e-3, 0.4), (2.0, 0.01)] {
+            let natural = scaled.threshold(rate * units.time(), pressure / units.stress());
+            let direct = law.threshold(rate, pressure);
+            assert!((natural.stress * units.stress() / direct.stress - 1.0).abs() < 1e-12);
+            assert!((natural.by_pressure - direct.by_pressure).abs() < 1e-12);
+        }
+        assert!((scaled.bulk_density() - 1.0).abs() < 1e-12);
+    }
 }
 
 #[cfg(test)]

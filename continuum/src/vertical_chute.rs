@@ -7,8 +7,10 @@
 //!
 //! ```text
 //! u(y) = (P/(ρ g)) (I_0/d) √(P/ρ_s) [F(m(W)) − F(max(m(y), μ_s))],
-//! F(m) = ∫ (m − μ_s)/(μ_2 − m) dm = −m − (μ_2 − μ_s) ln(μ_2 − m).
+//! F(m) = ∫ (m − μ_s)/(μ_2 − m) dm = −m − (μ_2 − μ_s) ln(μ_2 − m)
 //! ```
+//!
+//! for μ(I), and for any law the integral of the rate at which it bears τ under P.
 //!
 //! If y_p ≥ W the material rests; if m(W) ≥ μ_2 it accelerates for ever. Source: GDR MiDi,
 //! *Eur. Phys. J. E* 14 (2004) 341 (geometry), integration of μ(I).
@@ -19,14 +21,15 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, require};
 use crate::grid::Boundary;
-use crate::layer::{Layer, LayerSolution, Options, Progress};
-use crate::rheology::MuI;
+use crate::layer::{Layer, LayerSolution, Options, Progress, validate_grid};
+use crate::rheology::shear_law::integral;
+use crate::rheology::{MuI, ShearLaw};
 use crate::units::Units;
 
 /// One half of a vertical chute.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct VerticalChuteCase {
+pub struct VerticalChuteCase<L = MuI> {
     /// Half width W (m), from the plane of symmetry to the wall.
     pub half_width: f64,
     /// Normal stress P on the wall (Pa).
@@ -34,7 +37,7 @@ pub struct VerticalChuteCase {
     /// Gravity g along the chute (m/s²).
     pub gravity: f64,
     /// The material.
-    pub rheology: MuI,
+    pub rheology: L,
     /// Cells across the half width.
     pub cells: usize,
     /// Columns of a periodic grid of square cells; none computes a flow that does not vary along
@@ -43,7 +46,7 @@ pub struct VerticalChuteCase {
     pub columns: Option<usize>,
 }
 
-impl VerticalChuteCase {
+impl<L: ShearLaw> VerticalChuteCase<L> {
     /// Refuses parameters out of range, among them loads too small to hold the material.
     ///
     /// # Errors
@@ -63,16 +66,17 @@ impl VerticalChuteCase {
             self.gravity,
             "greater than 0 m/s² and finite",
         )?;
-        Layer::validate_grid(self.cells, self.columns)?;
-        let wall_stress = self.weight() * self.half_width - law.cohesion;
+        validate_grid(self.cells, self.columns)?;
+        let wall_stress = self.weight() * self.half_width - law.cohesion();
+        let [still, fastest] = law.friction_limits();
         require(
             self.load > 0.0
-                && (wall_stress <= law.mu_s * self.load || wall_stress < law.mu_2 * self.load),
+                && (wall_stress <= still * self.load || wall_stress < fastest * self.load),
             "load",
             self.load,
             format!(
                 "greater than {:.6} Pa: a smaller load lets the material accelerate for ever",
-                (wall_stress / law.mu_2).max(0.0)
+                (wall_stress / fastest).max(0.0)
             ),
         )
     }
@@ -84,7 +88,7 @@ impl VerticalChuteCase {
 
     /// Distance y_p (m) from the plane of symmetry to the edge of the rigid plug.
     pub fn plug_half_width(&self) -> f64 {
-        let threshold = self.rheology.cohesion + self.rheology.mu_s * self.load;
+        let threshold = self.rheology.cohesion() + self.rheology.friction_limits()[0] * self.load;
         (threshold / self.weight()).min(self.half_width)
     }
 
@@ -94,14 +98,9 @@ impl VerticalChuteCase {
         if plug >= self.half_width {
             return 0.0;
         }
-        let law = &self.rheology;
-        let friction = |y: f64| (self.weight() * y - law.cohesion) / self.load;
-        let antiderivative = |m: f64| -m - (law.mu_2 - law.mu_s) * (law.mu_2 - m).ln();
-        let crossover = law.i_0 / law.diameter * (self.load / law.grain_density).sqrt();
-        let inner = friction(y.abs().clamp(plug, self.half_width));
-        self.load / self.weight()
-            * crossover
-            * (antiderivative(friction(self.half_width)) - antiderivative(inner))
+        integral(y.abs().clamp(plug, self.half_width), self.half_width, |y| {
+            self.rheology.rate_under(self.weight() * y, self.load)
+        })
     }
 
     /// Exact pressure (Pa), the same everywhere.
@@ -130,7 +129,8 @@ impl VerticalChuteCase {
                 pressure: self.load,
             },
             acceleration: [self.gravity, 0.0],
-            rheology: self.rheology,
+            rheology: &self.rheology,
+            side_walls: None,
         };
         layer.solve(
             options,

@@ -11,12 +11,17 @@
 //! γ̇ of the order of ε, and nowhere is a largest viscosity imposed.
 //!
 //! Solvers stand behind [`YieldSolver`]: [`PrimalDual`] is the default, [`RegularisedViscosity`]
-//! is what is common elsewhere, for comparison.
+//! is what is common elsewhere, for comparison. With the crate's feature `conic`, `ConicProgram` solves
+//! the step without a floor, as a conic program: the reference for both on small grids.
 
 mod coefficients;
+#[cfg(feature = "conic")]
+mod conic;
 mod primal_dual;
 mod regularised;
 
+#[cfg(feature = "conic")]
+pub use conic::{ConicOptions, ConicProgram, PressureOf};
 pub use primal_dual::{PrimalDual, PrimalDualOptions};
 pub use regularised::{RegularisedOptions, RegularisedViscosity};
 
@@ -41,7 +46,7 @@ impl FlowState {
     /// A state at rest with the given pressure in the cells.
     pub fn at_rest(discretisation: &Discretisation, pressure: Vec<f64>) -> Self {
         Self {
-            u: vec![0.0; discretisation.grid().velocities()],
+            u: vec![0.0; discretisation.velocities()],
             p: pressure,
             s: vec![[0.0; COMPONENTS]; discretisation.points().len()],
         }
@@ -131,8 +136,12 @@ fn momentum_residual<R>(
                 point.weight * (point.rates(0)[slot] * s[0] + point.rates(1)[slot] * s[1]);
         }
     }
-    for &(cell, j, area) in discretisation.divergence() {
-        residual[j] -= area * state.p[cell];
+    let forces = discretisation
+        .divergence()
+        .iter()
+        .zip(discretisation.gradient());
+    for (&(cell, j, _), force) in forces {
+        residual[j] -= force * state.p[cell];
     }
     residual
         .iter()

@@ -3,10 +3,11 @@
 //! Axes: x downslope, y across, z normal to the plane; the top of the fixed base is at z ≈ 0 and gravity is
 //! g (sin θ, 0, −cos θ).
 
+mod order;
 mod result;
 mod spec;
 
-pub use result::{Cost, InclineResult, Outcome, SeriesPoint};
+pub use result::{Cost, InclineResult, Outcome, SeriesPoint, Unsettled};
 pub use spec::{InclineError, InclineSpec, Purpose, Start};
 
 use crate::calibration::{PointRules, flow_height, local_points};
@@ -92,6 +93,8 @@ impl InclineRun {
                 grains: Vec::new(),
                 contacts: Vec::new(),
                 bonds: Vec::new(),
+                bodies: Vec::new(),
+                body_contacts: Vec::new(),
             },
             averager: Averager::new(Layers, layers)?,
             simulation,
@@ -385,7 +388,15 @@ impl InclineRun {
             |p| flow_height(p, rules.surface_solid_fraction),
         );
         let steps = self.simulation.steps_done();
+        // Before that a flow is as it was set in motion.
+        let unit = (self.spec.diameter / self.spec.gravity).sqrt();
+        let settled = self.series.partition_point(|p| p.time < 10.0 * unit);
+        self.simulation.snapshot(&mut self.snapshot);
         InclineResult {
+            bed: 0,
+            grains: self.snapshot.grains.iter().filter(|g| !g.fixed).count() as u64,
+            sudden_loss: order::sudden_loss(&self.series[settled..], 3.0 * unit),
+            bond_order: order::bond_order(&self.snapshot),
             slope_degrees,
             purpose: self.spec.purpose,
             start: self.spec.start,

@@ -81,6 +81,8 @@ fn network_at_rest(seed: u64) -> Snapshot {
                     force,
                     arm,
                     partner_arm,
+                    torque: Vector3::zeros(),
+                    partner_torque: Vector3::zeros(),
                 });
             }
             net[i] += force;
@@ -95,6 +97,8 @@ fn network_at_rest(seed: u64) -> Snapshot {
             force: -net[i],
             arm: g.radius * random_vector(&mut rng),
             partner_arm: Vector3::zeros(),
+            torque: Vector3::zeros(),
+            partner_torque: Vector3::zeros(),
         });
     }
     Snapshot {
@@ -104,6 +108,8 @@ fn network_at_rest(seed: u64) -> Snapshot {
         grains,
         contacts,
         bonds,
+        bodies: Vec::new(),
+        body_contacts: Vec::new(),
     }
 }
 
@@ -183,6 +189,8 @@ fn stack() -> Snapshot {
             force: Vector3::new(0.0, 0.0, 2.0 * g * (4 - i) as f64),
             arm: Vector3::new(0.0, 0.0, -0.5),
             partner_arm: Vector3::new(0.0, 0.0, 0.5),
+            torque: Vector3::zeros(),
+            partner_torque: Vector3::zeros(),
         })
         .collect();
     Snapshot {
@@ -192,6 +200,8 @@ fn stack() -> Snapshot {
         grains,
         contacts,
         bonds: Vec::new(),
+        bodies: Vec::new(),
+        body_contacts: Vec::new(),
     }
 }
 
@@ -271,6 +281,8 @@ fn sheared_gas(rng: &mut ChaCha8Rng, time: f64, shear: f64, temperature: f64) ->
         grains,
         contacts: vec![],
         bonds: Vec::new(),
+        bodies: Vec::new(),
+        body_contacts: Vec::new(),
     }
 }
 
@@ -305,6 +317,35 @@ fn temperature_is_free_of_the_shear_within_a_layer() {
         let expected = 2.0 * (2600.0 / row.p.value).sqrt();
         assert!((i / expected - 1.0).abs() < 0.02);
     }
+}
+
+#[test]
+fn speed_gained_while_averaging_is_no_temperature() {
+    let layers = Layering {
+        lower: 0.0,
+        thickness: 1.0,
+        count: 10,
+    };
+    let mut temperatures = [0.0, 3.0].map(|gain| {
+        let mut rng = ChaCha8Rng::seed_from_u64(6);
+        let mut averager = Averager::new(Layers, layers).unwrap();
+        for i in 0..400 {
+            let time = 7.0 + f64::from(i) / 400.0;
+            let mut gas = sheared_gas(&mut rng, time, 2.0, 0.5);
+            gas.grains
+                .iter_mut()
+                .for_each(|g| g.velocity.x += gain * (time - 7.0));
+            averager.sample(&gas);
+        }
+        averager.profile(1.0, 2600.0).rows[5].temperature
+    });
+    // Left in, the drift would add 3²/12/3 = 0.25 to 0.5.
+    let [still, gaining] = &mut temperatures;
+    assert!(
+        (gaining.value - still.value).abs() < 1e-3,
+        "{still:?} {gaining:?}"
+    );
+    assert!((gaining.value - 0.5).abs() < 4.0 * gaining.error);
 }
 
 #[test]

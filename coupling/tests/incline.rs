@@ -299,6 +299,10 @@ fn tiny_campaign() -> CampaignSpec {
         search_time: 20.0,
         search_inertial_number: 0.05,
         usable_drift: 10.0,
+        other_beds: Vec::new(),
+        flow_beds: 1,
+        depths: Vec::new(),
+        seed: 1,
     }
 }
 
@@ -392,7 +396,7 @@ fn the_rule_of_drifts_decides(campaign: &CampaignSpec, runs: &[InclineResult]) {
     println!("drift and its error: {reaches:.3?}");
     reaches.sort_by(f64::total_cmp);
     let half = strict(0.5 * (reaches[1] + reaches[2]));
-    let result = evaluate(&half, flows, Vec::new(), Vec::new());
+    let result = evaluate(&half, flows, Vec::new(), Vec::new(), Vec::new());
     let text = &result.verdict.text;
     assert!(text.contains("2 of 4 flows left out"), "{text}");
     let used = result.runs.iter().filter(|r| half.is_usable(r));
@@ -409,4 +413,45 @@ fn the_rule_of_drifts_decides(campaign: &CampaignSpec, runs: &[InclineResult]) {
         assert!(text.contains(why), "{text}");
     }
     assert!(!text.contains("overlap") || text.contains("at any step since the start"));
+}
+
+#[test]
+fn a_grain_under_the_base_is_held_by_the_floor() {
+    // Pressed through a gap of the base, it would fall for ever.
+    let bed = small_bed();
+    let mut spec = spec(
+        bed,
+        20.0,
+        Start::Rest,
+        Purpose::OnsetSearch,
+        [1.0, 1.0, 6.0],
+    );
+    let lowest = bed.grains.iter().filter(|g| g.fixed);
+    let floor = lowest.map(|g| g.position.z - g.radius).fold(0.0, f64::min);
+    // A small one between the grains of the base, on its way down.
+    let gap = |x: f64, y: f64| {
+        let near = bed.grains.iter().filter(|g| g.fixed);
+        let apart = near.map(|g| (g.position.x - x).hypot(g.position.y - y) - g.radius);
+        apart.fold(f64::INFINITY, f64::min)
+    };
+    let spots =
+        (0..60).flat_map(|i| (0..50).map(move |j| (0.1 * f64::from(i), 0.1 * f64::from(j))));
+    let (x, y) = spots
+        .max_by(|a, b| gap(a.0, a.1).total_cmp(&gap(b.0, b.1)))
+        .unwrap();
+    let mut lost = bed.grains.iter().find(|g| !g.fixed).copied().unwrap();
+    lost.radius = 0.8 * gap(x, y).min(0.4);
+    lost.position = nalgebra::Vector3::new(x, y, floor + 1.1 * lost.radius);
+    lost.velocity = nalgebra::Vector3::new(0.0, 0.0, -1.0);
+    spec.bed.push(lost);
+    let mut run = InclineRun::new(spec).unwrap();
+    run.advance(8000).unwrap();
+    let mut snapshot = colluvium_dem::Snapshot::default();
+    run.simulation().snapshot(&mut snapshot);
+    let lowest = snapshot
+        .grains
+        .iter()
+        .map(|g| g.position.z - g.radius)
+        .fold(0.0, f64::min);
+    assert!(lowest > floor - 0.1, "{lowest} {floor}");
 }

@@ -64,6 +64,7 @@ fn main() -> Result<(), Box<dyn Error>> {
             law: law.into(),
             grains,
             walls: Vec::new(),
+            bodies: Vec::new(),
             timestep: 1e-4,
             threads: Threads::Serial,
         })?;

@@ -76,14 +76,15 @@ impl Simulation {
         numbers("list/grid", grids.flatten().collect());
         numbers("list/skin", vec![self.skin, self.hold]);
         numbers("list/age", vec![self.list.age]);
+        let standing = self.walls.iter().filter(|w| w.carrier.is_none());
         let walls: Vec<&WallContact> = self.wall_contacts.touching().collect();
         let histories: Vec<_> = walls.iter().map(|c| c.history).collect();
         numbers("walls/history", flatten(&histories));
         let normals: Vec<_> = walls.iter().map(|c| c.normal).collect();
         numbers("walls/normal", flatten(&normals));
-        let courses = self.walls.iter().map(|w| [w.course.along, w.course.speed]);
+        let courses = standing.clone().map(|w| [w.course.along, w.course.speed]);
         numbers("walls/course", courses.flatten().collect());
-        let impulses = self.walls.iter().flat_map(|w| w.impulse.numbers());
+        let impulses = standing.flat_map(|w| w.impulse.numbers());
         numbers("walls/impulse", impulses.collect());
         numbers("wall_impulse", self.impulse.to_vec());
         numbers("momentum_account", self.account.iter().copied().collect());
@@ -118,6 +119,7 @@ impl Simulation {
         );
         self.loads.record(&mut record);
         self.bonds.record(&mut record);
+        self.bodies.record(&mut record);
         self.fields.record(&mut record);
         self.moving_box.record(&self.cell(), &mut record);
         self.drain.record(&mut record);
@@ -280,7 +282,8 @@ impl Simulation {
 
     /// Takes up walls and the contacts with them; steps and lists are known.
     fn read_walls(&mut self, record: &Record) -> Result<(), String> {
-        let walls = self.walls.len();
+        let all = self.walls.len();
+        let walls = self.wall_count();
         let courses = sized(record, "walls/course", 2 * walls)?;
         let impulses = sized(record, "walls/impulse", WallImpulse::NUMBERS * walls)?;
         let step = Span::ending(self.steps, self.timestep);
@@ -290,13 +293,15 @@ impl Simulation {
             *wall = Standing::at(wall.wall.clone(), step, Course { along, speed });
             wall.impulse = WallImpulse::from_numbers(impulse);
         }
+        let last = [self.steps as f64 - 1.0, self.steps as f64].map(|n| n * self.timestep);
+        self.bodies.read(record, &mut self.walls, last)?;
         let of = narrow("walls/contact", record.counts("walls/contact")?)?;
         let of = of.as_chunks::<2>().0;
         let histories: Vec<[f64; HISTORY_MAX]> =
             rows(sized(record, "walls/history", of.len() * HISTORY_MAX)?);
         let normals: Vec<[f64; 3]> = rows(sized(record, "walls/normal", of.len() * 3)?);
         let n = self.grains.len();
-        let known = |&[grain, wall]: &[u32; 2]| (grain as usize) < n && (wall as usize) < walls;
+        let known = |&[grain, wall]: &[u32; 2]| (grain as usize) < n && (wall as usize) < all;
         if !of.iter().all(known) {
             return Err("array `walls/contact` names unknown grains or walls".into());
         }

@@ -16,7 +16,6 @@ use crate::bonds::Bond;
 use crate::contact::Stored;
 use crate::grains::{SPHERE_INERTIA, vector};
 use crate::simulation::Simulation;
-use crate::walls::Span;
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -95,7 +94,7 @@ impl Falling {
     }
 }
 
-/// What has happened to the energy of the free grains since the ledger was opened (J).
+/// What has happened to the energy of the free grains and bodies since the ledger was opened (J).
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize, Deserialize)]
 pub struct EnergyLedger {
     /// Kinetic energy when it was opened.
@@ -255,7 +254,7 @@ impl Simulation {
         let kinetic = self.energy().kinetic();
         let stored = self.stored_energy();
         let (bonded, freed) = (self.bond_energy(), self.bonds.count().energy_freed);
-        let potential = self.fields.potential();
+        let potential = self.fields.potential() + self.body_potential();
         self.ledger = Some(EnergyLedger {
             fields: Falling {
                 work: 0.0,
@@ -294,7 +293,7 @@ impl Simulation {
         let mut ledger = self.ledger.replace(before)?;
         ledger.kinetic = self.energy().kinetic();
         ledger.stored = Channels::of(&stored);
-        ledger.fields.potential = self.fields.potential();
+        ledger.fields.potential = self.fields.potential() + self.body_potential();
         ledger.bonds.stored = self.bond_energy();
         ledger.bonds.freed = self.bonds.count().energy_freed;
         Some(ledger)
@@ -403,13 +402,13 @@ impl Simulation {
             }
         }
         self.book_walls(&mut ledger, &moving, kick);
+        self.book_bodies(&mut ledger, kick);
         self.ledger = Some(ledger);
     }
 
-    /// Books the work of contacts with walls; what a moving wall gives is drive. Its velocity, too, is
-    /// the mean of those before and after the kick.
+    /// Books the work of contacts with walls and bodies; what those that move as they are told give is
+    /// drive. Their velocity, too, is the mean of those before and after the kick.
     fn book_walls(&self, ledger: &mut EnergyLedger, moving: &[Moving], kick: f64) {
-        let next = Span::ending(self.steps + 1, self.timestep);
         for contact in self.wall_contacts.touching() {
             let i = contact.grain as usize;
             let (grain, wall) = (&moving[i], &self.walls[contact.wall as usize]);
@@ -418,14 +417,24 @@ impl Simulation {
             if wall.moves() {
                 let x = &self.grains.place[i];
                 let arm = wall.seen(&vector(x), &self.domain) - normal * (x[3] - contact.overlap);
-                let stride = wall.stride(next);
-                spin = 0.5 * (wall.spin + stride.spin);
-                velocity = 0.5 * (wall.velocity + stride.velocity) + spin.cross(&arm);
-                let power = vector(&slot[0]).dot(&velocity) + vector(&slot[2]).dot(&spin);
-                ledger.drive += kick * power;
+                let offset = wall.carrier.map_or(Vector3::zeros(), |c| c.offset);
+                let twist = self.mean_twist(wall, kick.abs());
+                spin = twist.spin;
+                velocity = twist.at(&(offset + arm));
+                if !wall.yields() {
+                    let power = vector(&slot[0]).dot(&velocity) + vector(&slot[2]).dot(&spin);
+                    ledger.drive += kick * power;
+                }
             }
             let against = [grain.velocity - velocity, grain.turn, grain.spin - spin];
             book(&mut ledger.work, slot, &normal, kick, against);
+            if grain.fixed {
+                let power = [&grain.velocity, &grain.turn, &grain.spin]
+                    .into_iter()
+                    .zip(slot);
+                let power = power.map(|(v, force)| vector(force).dot(v));
+                ledger.drive -= kick * power.sum::<f64>();
+            }
         }
     }
 }

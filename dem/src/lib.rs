@@ -1,6 +1,6 @@
-//! Discrete element engine: grains, contact laws, search, walls, preparation.
+//! Discrete element engine: grains, contact laws, search, walls, rigid bodies, preparation.
 //!
-//! * A scene hands over a [`Setup`]: grains, walls, a contact law, gravity, a time step.
+//! * A scene hands over a [`Setup`]: grains, walls, bodies, a contact law, gravity, a time step.
 //! * [`Simulation::advance`] integrates Newton's equations by leap-frog.
 //! * [`Simulation::snapshot`] shows all grains and contacts of one instant; coarse-graining and
 //!   output need nothing else.
@@ -8,6 +8,7 @@
 //! SI units; overlap and compression positive; x downslope, y across, z away from the ground.
 //! Results are the same bits for any number of threads and after a restart from a [`Record`].
 
+pub mod bodies;
 mod bonds;
 mod boundaries;
 mod checkpoint;
@@ -43,6 +44,10 @@ pub mod timestep;
 mod validity;
 pub mod walls;
 
+pub use bodies::{
+    Body, BodyContactSample, BodyLoad, BodySample, Freedom, Hinge, MassProperties, Part, Solid,
+    Touched,
+};
 pub use bonds::{
     BondCount, BondRule, BondState, BondStress, Cement, Cluster, Clusters, Section as BondSection,
 };

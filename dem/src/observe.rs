@@ -1,5 +1,6 @@
 //! Looking at a simulation: snapshots, energies, sums, hash.
 
+use crate::bodies::Touched;
 use crate::chunk::Chunk;
 use crate::contact::composition::Visitor;
 use crate::contact::{HISTORY_MAX, Interaction, Stored};
@@ -85,14 +86,21 @@ impl Simulation {
             if distance >= radii && !self.holds(&self.history_of(chunk, k)) {
                 continue;
             }
+            let slot = &chunk.slots[k * rows..][..rows];
+            let (turn, moment) = (
+                vector(&slot[1]),
+                slot.get(2).map_or_else(Vector3::zeros, vector),
+            );
             // The contact point divides the line of centres as the radii do.
             into.contacts.push(ContactSample {
                 grain: i,
                 partner: Partner::Grain(j),
                 overlap: radii - distance,
-                force: vector(&chunk.slots[k * rows]),
+                force: vector(&slot[0]),
                 arm: -apart * (a[3] / radii),
                 partner_arm: apart * (b[3] / radii),
+                torque: turn * a[3] + moment,
+                partner_torque: turn * b[3] - moment,
             });
         }
         for contact in self.wall_contacts.touching() {
@@ -100,14 +108,21 @@ impl Simulation {
             let distance = self.grains.place[i][3] - contact.overlap;
             into.contacts.push(ContactSample {
                 grain: i,
-                partner: Partner::Wall(contact.wall as usize),
+                partner: match self.touched(contact.wall as usize) {
+                    Touched::Wall(wall) => Partner::Wall(wall),
+                    Touched::Body(body) => Partner::Body(body),
+                },
                 overlap: contact.overlap,
                 force: vector(&contact.slot[0]),
                 arm: -Vector3::from(contact.normal) * distance,
                 partner_arm: Vector3::zeros(),
+                torque: vector(&contact.slot[1]) * self.grains.place[i][3]
+                    + vector(&contact.slot[2]),
+                partner_torque: Vector3::zeros(),
             });
         }
         self.bond_samples(&mut into.bonds);
+        self.body_samples(&mut into.bodies, &mut into.body_contacts);
     }
 
     /// Kinetic and elastic energy at this instant.
@@ -138,17 +153,19 @@ impl Simulation {
         }
         for contact in self.wall_contacts.touching() {
             let i = contact.grain as usize;
-            let pair = self.pair(i, self.walls[contact.wall as usize].wall.material);
+            let wall = &self.walls[contact.wall as usize];
+            let pair = self.pair(i, wall.wall.material);
             self.add_stored(
                 &mut energy,
                 pair,
                 contact.overlap,
-                self.grains.turn[i][3],
+                self.grains.turn[i][3] + wall.curvature(),
                 &contact.history[..width],
             );
         }
         energy.bonds = self.bond_energy();
         energy.potential = self.fields.potential();
+        self.add_body_energy(&mut energy);
         energy
     }
 
@@ -194,16 +211,18 @@ impl Simulation {
         energy.twisting += stored.twisting;
     }
 
-    /// Momentum of the free grains at this instant (N s).
+    /// Momentum of the free grains and bodies at this instant (N s).
     pub fn momentum(&mut self) -> Vector3<f64> {
         self.samples()
             .iter()
             .filter(|g| !g.fixed)
             .map(|g| g.mass * g.velocity)
-            .sum()
+            .sum::<Vector3<f64>>()
+            + self.body_momentum_now()
     }
 
-    /// Momentum that fixed grains and walls have taken from the free grains since the start (N s).
+    /// Momentum that fixed grains, walls and bodies that are not free have taken from free grains and
+    /// bodies since the start (N s).
     ///
     /// With constant gravity g: `momentum(t) + wall_impulse(t) - m g t` is constant to round-off, up
     /// to half a step's force, since velocities inside live half a step back.
@@ -220,7 +239,7 @@ impl Simulation {
             .sum()
     }
 
-    /// Momentum of the free grains as the integrator holds it, half a step back (N s).
+    /// Momentum of the free grains and bodies as the integrator holds it, half a step back (N s).
     ///
     /// `leapfrog_momentum(t) + wall_impulse(t)` changes by exactly the weight times time.
     pub fn leapfrog_momentum(&self) -> Vector3<f64> {
@@ -228,7 +247,7 @@ impl Simulation {
         for i in (0..self.grains.len()).filter(|&i| !self.grains.is_fixed(i)) {
             sum += self.grains.mass[i] * vector(&self.grains.motion[i]);
         }
-        sum
+        sum + self.body_momentum().0
     }
 
     /// How far the momentum of grains and walls is from that of the start plus gravity's, relative to
@@ -239,6 +258,7 @@ impl Simulation {
         let size: f64 = free
             .map(|i| self.grains.mass[i] * vector(&self.grains.motion[i]).norm())
             .sum();
+        let size = size + self.body_momentum().1;
         let scale = size.max(taken.norm()).max(self.account.norm());
         if scale > 0.0 {
             (held + taken - self.account).norm() / scale
@@ -247,7 +267,7 @@ impl Simulation {
         }
     }
 
-    /// Angular momentum of the free grains about the origin, spins included, as the integrator holds
+    /// Angular momentum of the free grains and bodies about the origin, spins included, as the integrator holds
     /// it: positions now, velocities half a step back (N m s). Without walls, gravity and periodic axes
     /// it is conserved to round-off.
     pub fn leapfrog_angular_momentum(&self) -> Vector3<f64> {
@@ -261,7 +281,7 @@ impl Simulation {
             let radius = self.grains.place[i][3];
             sum += self.grains.mass[i] * (x.cross(&v) + SPHERE_INERTIA * radius * turn);
         }
-        sum
+        sum + self.body_angular_momentum()
     }
 
     /// Hash of the bits of all positions, velocities, spins and springs, in the grains' own order.
@@ -306,6 +326,7 @@ impl Simulation {
             c.history.iter().for_each(|h| hash.take(h.to_bits()));
         }
         self.bonds.hash(&mut hash);
+        self.bodies.hash(&mut hash);
         hash.finish()
     }
 }

@@ -41,6 +41,17 @@ pub enum Region {
         /// Radius (m).
         radius: f64,
     },
+    /// A truncated cone, solid.
+    Frustum {
+        /// Centre of its first end (m).
+        point: Vector3<f64>,
+        /// Unit vector from there to the other end.
+        axis: Vector3<f64>,
+        /// Distance of the ends (m).
+        length: f64,
+        /// Radii at both ends (m).
+        radii: [f64; 2],
+    },
     /// Where all of these are.
     All(Vec<Region>),
     /// Where any of these is.
@@ -66,6 +77,7 @@ impl Region {
                 axis,
                 radius,
             } => (x - point).cross(axis).norm() <= radius * axis.norm(),
+            Region::Frustum { .. } => self.depth(x) >= 0.0,
             Region::All(parts) => parts.iter().all(|part| part.contains(x)),
             Region::Any(parts) => parts.iter().any(|part| part.contains(x)),
             Region::Outside(part) => !part.contains(x),
@@ -93,6 +105,18 @@ impl Region {
                 axis,
                 radius,
             } => radius - (x - point).cross(axis).norm() / axis.norm(),
+            Region::Frustum {
+                point,
+                axis,
+                length,
+                radii: [low, high],
+            } => {
+                let along = (x - point).dot(axis);
+                let across = (x - point).cross(axis).norm();
+                let slope = (high - low) / length;
+                let side = (low + slope * along - across) / slope.hypot(1.0);
+                side.min(along).min(length - along)
+            }
             Region::All(parts) => {
                 let depths = parts.iter().map(|part| part.depth(x));
                 depths.fold(f64::INFINITY, f64::min)
@@ -141,6 +165,18 @@ impl Region {
                     }
                 }
                 bounds
+            }
+            Region::Frustum {
+                point,
+                axis,
+                length,
+                radii,
+            } => {
+                // A disk across a unit vector a reaches R √(1 - a_k²) along axis k.
+                let ends = [(*point, radii[0]), (point + axis * *length, radii[1])];
+                let reach = |r: f64| axis.map(|a| r * (1.0 - a * a).max(0.0).sqrt());
+                let [a, b] = ends.map(|(x, r)| [x - reach(r), x + reach(r)]);
+                [a[0].inf(&b[0]), a[1].sup(&b[1])]
             }
             Region::All(parts) => parts.iter().fold(everything, |[low, high], part| {
                 let [l, h] = part.bounds();
@@ -205,6 +241,23 @@ impl Region {
                 direction("axis", axis)?;
                 length("radius", *radius)
             }
+            Region::Frustum {
+                point,
+                axis,
+                length: l,
+                radii,
+            } => {
+                finite("point", point)?;
+                check(&format!("{key}.axis"), axis.norm(), "a unit vector", |n| {
+                    (n - 1.0).abs() < 1e-9
+                })?;
+                length("length", *l)?;
+                for (end, r) in radii.iter().enumerate() {
+                    let key = format!("{key}.radii[{end}]");
+                    check(&key, *r, "≥ 0 m", |r| r >= 0.0)?;
+                }
+                length("radii, the larger", radii[0].max(radii[1]))
+            }
             Region::All(parts) | Region::Any(parts) => parts
                 .iter()
                 .enumerate()
@@ -259,6 +312,18 @@ impl fmt::Display for Region {
                 axis.y,
                 axis.z
             ),
+            Region::Frustum {
+                point: at,
+                length,
+                radii,
+                ..
+            } => write!(
+                f,
+                "the truncated cone of radii {:.4e} and {:.4e} m, {length:.4e} m long, from {}",
+                radii[0],
+                radii[1],
+                point(at)
+            ),
             Region::All(parts) => list(f, parts, " in "),
             Region::Any(parts) => list(f, parts, " or "),
             Region::Outside(part) => write!(f, "outside {part}"),
@@ -291,7 +356,22 @@ mod tests {
             center: Vector3::new(0.0, 0.0, 3.0),
             radius: 0.5,
         };
+        // Slope 3:4 of the side, from radius 1 to 4 over 4.
+        let cone = Region::Frustum {
+            point: Vector3::zeros(),
+            axis: Vector3::z(),
+            length: 4.0,
+            radii: [1.0, 4.0],
+        };
+        assert_eq!(
+            cone.bounds(),
+            [Vector3::new(-4.0, -4.0, 0.0), Vector3::new(4.0, 4.0, 4.0)]
+        );
+        let middle = cone.depth(&Vector3::new(0.0, 0.0, 2.0));
+        assert!((middle - 2.0).abs() < 1e-15, "{middle}");
         for (region, inside, outside) in [
+            (&cone, [1.7, 1.7, 2.0], [1.8, 1.8, 2.0]),
+            (&cone, [0.0, 3.9, 4.0], [0.0, 3.9, 4.1]),
             (&top, [9.0, -9.0, 2.0], [0.0, 0.0, 1.99]),
             (&crack, [5.0, 0.0, 2.62], [5.0, 0.0, 2.63]),
             (&pipe, [0.6, 0.7, -50.0], [0.8, 0.7, 0.0]),

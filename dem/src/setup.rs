@@ -1,5 +1,6 @@
 //! What a simulation starts from, and what is wrong with it.
 
+use crate::bodies::{Body, feeling_parts};
 use crate::contact::{
     Cohesion, ContactLaw, Damping, Elasticity, LawTable, Laws, Normal, Rolling, SpringStiffness,
     Tangential,
@@ -7,7 +8,7 @@ use crate::contact::{
 use crate::domain::Domain;
 use crate::grains::Grain;
 use crate::preparation::{Rest, RestMeasures};
-use crate::timestep::{self, Choice, Conditions, Pair, Shares};
+use crate::timestep::{self, Choice, Classes, Conditions, Pair, Shares};
 use crate::walls::Wall;
 use nalgebra::Vector3;
 
@@ -34,6 +35,8 @@ pub struct Setup {
     pub grains: Vec<Grain>,
     /// Walls; their order is their number.
     pub walls: Vec<Wall>,
+    /// Rigid bodies; their order is their number.
+    pub bodies: Vec<Body>,
     /// Length of a step (s).
     pub timestep: f64,
     /// Sharing of a step over threads.
@@ -298,6 +301,9 @@ impl Setup {
             wall.validate(&format!("walls[{k}]"))?;
             known_material(wall.material, materials)?;
         }
+        for (k, body) in self.bodies.iter().enumerate() {
+            body.validate(&format!("bodies[{k}]"), materials)?;
+        }
         check_box(&self.domain, largest, skin)?;
         Ok(law)
     }
@@ -316,7 +322,12 @@ impl Setup {
             known_material(wall.material, laws.materials())?;
         }
         let walls: Vec<u16> = self.walls.iter().map(|w| w.material).collect();
-        let limits = timestep::limits(&self.grains, &walls, &laws, conditions, shares);
+        for (k, body) in self.bodies.iter().enumerate() {
+            body.validate(&format!("bodies[{k}]"), laws.materials())?;
+        }
+        let grains = self.grains.iter().map(timestep::Body::from);
+        let classes = Classes::of(grains.chain(feeling_parts(self, &laws)?), &walls);
+        let limits = timestep::limits_of(&classes, &laws, conditions, shares);
         Ok(timestep::choose(limits, shares.safety))
     }
 

@@ -6,6 +6,7 @@ mod lists;
 pub use diverged::Diverged;
 pub(crate) use lists::Layout;
 
+use crate::bodies::Bodies;
 use crate::bonds::Bonds;
 use crate::boundaries::{Drain, MovingBox};
 use crate::contact::composition::Visitor;
@@ -67,6 +68,8 @@ pub struct Simulation {
     pub(crate) list: Neighbours,
     pub(crate) reach: Reach,
     pub(crate) wall_contacts: WallContacts,
+    /// Bodies; their parts stand behind the walls.
+    pub(crate) bodies: Bodies,
     pub(crate) loads: Loads,
     pub(crate) bonds: Bonds,
     pub(crate) fields: Gravity,
@@ -129,13 +132,16 @@ impl Simulation {
         let largest_radius = radii().fold(0.0, f64::max);
         let skin = skin_of(smallest);
         let law = setup.validate(skin)?;
+        let mut walls = stand(setup.walls, setup.timestep);
+        let bodies = Bodies::new(setup.bodies, &mut walls, &law, setup.timestep)?;
         Ok(Simulation {
             domain: setup.domain,
             gravity: setup.gravity,
             layout: law.visit(LayoutOf),
             hold: hold_of(&law, largest_radius),
             law: Arc::new(law),
-            walls: stand(setup.walls, setup.timestep),
+            walls,
+            bodies,
             timestep: setup.timestep,
             parallel: setup.threads == Threads::Rayon,
             width: Width::widest(),
@@ -224,6 +230,7 @@ impl Simulation {
         self.reach.remember();
         self.bonds.remember();
         self.wall_contacts.remember();
+        self.bodies.remember();
         self.springs_were_current = self.springs_current;
         self.evaluate_forces();
     }
@@ -236,6 +243,7 @@ impl Simulation {
         self.reach.recall();
         self.bonds.recall();
         self.wall_contacts.recall();
+        self.bodies.recall();
         self.springs_current = self.springs_were_current;
         self.current = false;
     }
@@ -269,7 +277,7 @@ impl Simulation {
         };
         self.springs_current = true;
         let lever = self.law.lever();
-        let walls = if pass == Pass::Motion {
+        let mut walls = if pass == Pass::Motion {
             0.0
         } else {
             let scene = Scene {
@@ -281,6 +289,11 @@ impl Simulation {
             self.wall_contacts.evaluate(law, &mut self.walls, &scene)
         };
         if pass != Pass::Motion {
+            if !self.bodies.is_empty() {
+                self.lay_body_loads();
+                let bodies = &mut self.bodies;
+                walls = walls.max(bodies.evaluate(law, &mut self.walls, &self.domain, step));
+            }
             self.evaluate_loads(step.stretch);
         }
         let (g, images) = (self.gravity, Images::of(&self.cell()));
@@ -323,12 +336,16 @@ impl Simulation {
     /// Books what a step has done to momentum and to the lists' lifetimes, and moves the walls.
     fn keep_accounts(&mut self, kick: f64) {
         let next = Span::ending(self.steps + 1, self.timestep);
-        for wall in &mut self.walls {
+        let walls = self.walls.iter_mut();
+        for wall in walls.filter(|wall| wall.carrier.is_none()) {
             for (sum, force) in self.impulse.iter_mut().zip(wall.load.force.iter()) {
                 *sum += kick * force;
             }
             wall.impulse.take(&wall.load, kick);
             wall.advance(next);
+        }
+        if !self.bodies.is_empty() {
+            self.step_bodies(kick);
         }
         self.account += kick * (self.weighed * self.gravity + self.loads.external);
         self.list.age += self.timestep;
@@ -400,7 +417,9 @@ impl Simulation {
 
     /// Velocities now belong to the time of the positions, not to half a step before.
     fn restart_motion(&mut self) {
+        self.synchronise_bodies();
         self.steps_since_start = 0;
+        self.bodies.place(&mut self.walls);
         self.rebuild();
         self.open_account();
     }
@@ -416,7 +435,8 @@ impl Simulation {
 
     /// Notes the mass that gravity acts on.
     pub(crate) fn weigh(&mut self) {
-        self.weighed = self.free_mass();
+        let bodies = self.bodies.rigid.iter().map(|body| body.free_mass());
+        self.weighed = self.free_mass() + bodies.sum::<f64>();
     }
 
     /// Time since the start (s).

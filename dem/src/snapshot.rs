@@ -1,5 +1,6 @@
 //! What an observer sees of the grains at one instant: the input of coarse-graining and of output.
 
+use crate::bodies::{BodyContactSample, BodySample};
 use crate::bonds::BondStress;
 use crate::domain::Domain;
 use nalgebra::Vector3;
@@ -30,6 +31,8 @@ pub enum Partner {
     Grain(usize),
     /// Index of the wall.
     Wall(usize),
+    /// Index of the body.
+    Body(usize),
 }
 
 /// A contact at one instant. Each pair appears once.
@@ -45,10 +48,15 @@ pub struct ContactSample {
     pub force: Vector3<f64>,
     /// From the centre of `grain` to the contact point (m).
     pub arm: Vector3<f64>,
-    /// From the centre of `partner` to the contact point (m); zero for a wall.
+    /// From the centre of `partner` to the contact point (m); zero for a wall or
+    /// a body.
     ///
     /// `arm - partner_arm` is the branch vector from `grain` to `partner`, nearest image.
     pub partner_arm: Vector3<f64>,
+    /// Torque on `grain` about its centre (N m): that of the force, and moments of rolling and twisting.
+    pub torque: Vector3<f64>,
+    /// Torque on `partner` about its centre (N m); zero for a wall.
+    pub partner_torque: Vector3<f64>,
 }
 
 /// A whole bond at one instant; it acts beside the contact of its grains, if they touch.
@@ -71,8 +79,9 @@ pub struct BondSample {
 }
 
 impl BondSample {
-    /// The bond as if it were a contact: force and arms alone, without its moments.
+    /// The bond as if it were a contact; what its force and moments do about any point cancels in the pair.
     pub fn as_contact(&self) -> ContactSample {
+        let branch = self.arm - self.partner_arm;
         ContactSample {
             grain: self.grains[0],
             partner: Partner::Grain(self.grains[1]),
@@ -80,6 +89,8 @@ impl BondSample {
             force: self.force,
             arm: self.arm,
             partner_arm: self.partner_arm,
+            torque: self.moment,
+            partner_torque: branch.cross(&self.force) - self.moment,
         }
     }
 }
@@ -99,6 +110,10 @@ pub struct Snapshot {
     pub contacts: Vec<ContactSample>,
     /// All whole bonds, in the order in which they were made.
     pub bonds: Vec<BondSample>,
+    /// All rigid bodies.
+    pub bodies: Vec<BodySample>,
+    /// Contacts of bodies with walls and with each other.
+    pub body_contacts: Vec<BodyContactSample>,
 }
 
 impl Default for Snapshot {
@@ -114,6 +129,8 @@ impl Default for Snapshot {
             grains: Vec::new(),
             contacts: Vec::new(),
             bonds: Vec::new(),
+            bodies: Vec::new(),
+            body_contacts: Vec::new(),
         }
     }
 }

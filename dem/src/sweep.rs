@@ -465,6 +465,7 @@ mod tests {
             law,
             grains,
             walls: vec![Wall::plane(Vector3::zeros(), Vector3::z())],
+            bodies: Vec::new(),
             timestep: 1e-4,
             threads: Threads::Serial,
         };

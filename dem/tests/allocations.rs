@@ -66,6 +66,7 @@ fn flow(threads: Threads, floor: impl Fn(f64) -> Wall) -> Simulation {
         law: law.into(),
         grains: bed.grains,
         walls: vec![floor(bed.domain.lower.z)],
+        bodies: Vec::new(),
         timestep: 5e-4,
         threads,
     })

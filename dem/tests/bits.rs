@@ -54,6 +54,7 @@ fn setup(threads: Threads) -> Setup {
             Vector3::new(0.0, 0.0, bed().domain.lower.z),
             Vector3::z(),
         )],
+        bodies: Vec::new(),
         timestep: 5e-4,
         threads,
     }

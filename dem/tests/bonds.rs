@@ -41,6 +41,7 @@ fn free_space(grains: Vec<Grain>, timestep: f64) -> Setup {
         law: laws()[0].1.into(),
         grains,
         walls: Vec::new(),
+        bodies: Vec::new(),
         timestep,
         threads: Threads::Serial,
     }

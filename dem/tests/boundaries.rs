@@ -35,6 +35,7 @@ fn cloud(across: i32, spacing: f64, speed: f64, law: ContactLaw) -> Setup {
         gravity: Vector3::zeros(),
         law: law.into(),
         walls: Vec::new(),
+        bodies: Vec::new(),
         timestep: STEP,
         threads: Threads::Serial,
     }

@@ -50,6 +50,7 @@ fn row(free: usize) -> Simulation {
         law: laws()[0].1.into(),
         grains,
         walls: Vec::new(),
+        bodies: Vec::new(),
         timestep: step,
         threads: Threads::Serial,
     })

@@ -22,6 +22,7 @@ fn space(grains: Vec<Grain>, timestep: f64, threads: Threads) -> Setup {
         law: laws()[0].1.into(),
         grains,
         walls: Vec::new(),
+        bodies: Vec::new(),
         timestep,
         threads,
     }

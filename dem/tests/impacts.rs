@@ -32,6 +32,7 @@ fn setup(law: ContactLaw, grains: Vec<Grain>, walls: Vec<Wall>, steps_per_contac
     Setup {
         domain: open_box(),
         gravity: Vector3::zeros(),
+        bodies: Vec::new(),
         timestep: law.contact_time(0.5, 0.25, 1.0) / steps_per_contact,
         law: law.into(),
         grains,

@@ -33,7 +33,9 @@ fn record(setup: &Setup) -> Record {
 /// Ways to spoil an array of real numbers.
 const SPOILS: [fn(&mut Vec<f64>); 8] = [
     |v| v.clear(),
-    |v| drop(v.pop()),
+    |v| {
+        v.pop();
+    },
     |v| v.push(1.0),
     |v| v.fill(f64::NAN),
     |v| v.fill(f64::INFINITY),
@@ -45,7 +47,9 @@ const SPOILS: [fn(&mut Vec<f64>); 8] = [
 /// Ways to spoil an array of whole numbers.
 const MISCOUNTS: [fn(&mut Vec<u64>); 8] = [
     |v| v.clear(),
-    |v| drop(v.pop()),
+    |v| {
+        v.pop();
+    },
     |v| v.push(1),
     |v| v.fill(u64::MAX),
     |v| v.fill(u64::from(u32::MAX)),

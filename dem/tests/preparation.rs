@@ -213,6 +213,7 @@ fn floor(edge: f64, height: f64, grains: Vec<Grain>, law: ContactLaw) -> Setup {
         law: law.into(),
         grains,
         walls: vec![Wall::plane(Vector3::zeros(), Vector3::z())],
+        bodies: Vec::new(),
         timestep: 1e-3,
         threads: Threads::Serial,
     }
@@ -472,6 +473,7 @@ fn sticking(grains: Vec<Grain>, threads: Threads) -> Simulation {
         law: law.into(),
         grains,
         walls: Vec::new(),
+        bodies: Vec::new(),
         timestep: 2e-4,
         threads,
     })

@@ -2,9 +2,11 @@
 //! with that law beside the grains.
 
 mod comparison;
+mod design;
 mod findings;
 mod material;
 
+pub use design::{flow_degrees, prospects};
 pub use material::published_material;
 
 use crate::cost::Cost;
@@ -17,13 +19,15 @@ use crate::run::{self, Ended, RunOptions, incline, precheck};
 use crate::run_directory::RunDirectory;
 use crate::scene::{InclineScene, Scene, SceneBody};
 use crate::summary::Status;
-use colluvium_coupling::calibration::MuIFit;
+use colluvium_coupling::calibration::{MuIFit, friction_table};
 use colluvium_coupling::campaign::{
-    Bracket, CampaignError, CampaignEvent, CampaignResult, CampaignSpec, GuessedLaw, run_campaign,
+    Bracket, CampaignError, CampaignEvent, CampaignResult, CampaignSpec, GuessedLaw, OtherBed,
+    run_campaign,
 };
 use colluvium_coupling::incline::{InclineResult, Purpose};
 use colluvium_dem::Threads;
 use colluvium_dem::preparation::Bed;
+use rayon::prelude::*;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
 use std::sync::Mutex;
@@ -35,6 +39,8 @@ const ANGLES: &str = "angles.json";
 pub const CAMPAIGN: &str = "campaign.json";
 /// The fitted law.
 pub const RHEOLOGY: &str = "rheology.toml";
+/// Samples of the posterior of the fitted law, as a table.
+pub const POSTERIOR: &str = "posterior";
 
 /// Runs the campaign of an incline scene and writes its directory.
 pub fn calibrate(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> {
@@ -46,7 +52,7 @@ pub fn calibrate(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> 
     };
     interruption::listen();
     precheck::incline(scene, body)?;
-    let spec = campaign_spec(scene, body, &precheck::stand_in_bed(body));
+    let spec = campaign_spec(scene, body, &precheck::stand_in_bed(body), Beds::default());
     precheck::campaign(scene, &spec)?;
     let threads = options.threads.unwrap_or_else(rayon::current_num_threads);
     let (directory, before) = run::open_directory(scene, options, "calibrate")?;
@@ -117,7 +123,52 @@ fn finished_angles(directory: &RunDirectory, resume: bool) -> Result<Angles, Fai
     Ok(angles)
 }
 
-fn campaign_spec(scene: &Scene, body: &InclineScene, bed: &Bed) -> CampaignSpec {
+/// Beds besides the first.
+#[derive(Default)]
+struct Beds {
+    others: Vec<OtherBed>,
+    depths: Vec<OtherBed>,
+    /// Grain-steps that settling them took.
+    grain_steps: u64,
+}
+
+/// Settles the beds of other seeds and depths, side by side; nothing if the user stopped it.
+fn more_beds(body: &InclineScene) -> Result<Option<Beds>, Failure> {
+    let keys = &body.calibration;
+    let mut scenes: Vec<InclineScene> = (1..keys.beds)
+        .map(|k| InclineScene {
+            seed: body.seed + k,
+            ..body.clone()
+        })
+        .collect();
+    scenes.extend(keys.depths.iter().map(|factor| {
+        let mut shallow = body.clone();
+        shallow.grains.count = (body.grains.count as f64 * factor).round().max(50.0) as u64;
+        shallow
+    }));
+    let settled: Vec<Result<Option<Bed>, Failure>> = scenes
+        .par_iter()
+        .with_max_len(1)
+        .map(|scene| incline::settle(scene, Threads::Serial, &Bar::hidden()))
+        .collect();
+    let mut beds = Beds::default();
+    for (k, bed) in settled.into_iter().enumerate() {
+        let Some(bed) = bed? else { return Ok(None) };
+        beds.grain_steps += bed.report.grain_steps;
+        let list = if (k as u64) + 1 < keys.beds {
+            &mut beds.others
+        } else {
+            &mut beds.depths
+        };
+        list.push(OtherBed {
+            domain: bed.domain,
+            grains: bed.grains,
+        });
+    }
+    Ok(Some(beds))
+}
+
+fn campaign_spec(scene: &Scene, body: &InclineScene, bed: &Bed, beds: Beds) -> CampaignSpec {
     let keys = &body.calibration;
     let bracket = |b: crate::scene::Bracket| Bracket {
         low: b.low,
@@ -128,7 +179,7 @@ fn campaign_spec(scene: &Scene, body: &InclineScene, bed: &Bed) -> CampaignSpec 
         // Angles run side by side, each on one thread: no bit depends on their number.
         base: incline::spec(body, bed, Threads::Serial),
         published_material: published_material(scene).map(String::from),
-        flow_angles_degrees: keys.flow_degrees.clone(),
+        flow_angles_degrees: flow_degrees(body),
         guessed_law: GuessedLaw {
             mu_s: keys.guess.mu_s,
             mu_2: keys.guess.mu_2,
@@ -139,6 +190,10 @@ fn campaign_spec(scene: &Scene, body: &InclineScene, bed: &Bed) -> CampaignSpec 
         search_time: keys.search_time,
         search_inertial_number: keys.search_inertial_number,
         usable_drift: keys.usable_drift,
+        other_beds: beds.others,
+        flow_beds: keys.flow_beds as usize,
+        depths: beds.depths,
+        seed: body.seed,
     }
 }
 
@@ -159,8 +214,9 @@ impl Observer<'_> {
             CampaignEvent::Started {
                 slope_degrees,
                 purpose,
+                bed,
             } => {
-                let label = label(slope_degrees, purpose);
+                let label = label(slope_degrees, purpose, bed);
                 self.directory.journal.note(&format!("{label} begins"));
                 if let Ok(mut shown) = self.shown.lock() {
                     shown.insert(label.clone(), self.bars.add(&label));
@@ -169,10 +225,11 @@ impl Observer<'_> {
             CampaignEvent::Progress {
                 slope_degrees,
                 purpose,
+                bed,
                 fraction,
             } => {
                 if let Ok(shown) = self.shown.lock()
-                    && let Some(bar) = shown.get(&label(slope_degrees, purpose))
+                    && let Some(bar) = shown.get(&label(slope_degrees, purpose, bed))
                 {
                     bar.set(fraction);
                 }
@@ -183,7 +240,7 @@ impl Observer<'_> {
 
     /// Saves a finished run, so that a campaign that is stopped goes on from there.
     fn keep(&self, result: &InclineResult) {
-        let label = label(result.slope_degrees, result.purpose);
+        let label = label(result.slope_degrees, result.purpose, result.bed);
         let how = incline::outcome_words(result);
         self.directory
             .journal
@@ -206,13 +263,17 @@ impl Observer<'_> {
     }
 }
 
-fn label(slope_degrees: f64, purpose: Purpose) -> String {
+fn label(slope_degrees: f64, purpose: Purpose, bed: u64) -> String {
     let what = match purpose {
         Purpose::Measure => "flow",
         Purpose::StopSearch => "stop?",
         Purpose::OnsetSearch => "onset?",
     };
-    format!("{what} {slope_degrees:.2} degrees")
+    if bed == 0 {
+        format!("{what} {slope_degrees:.2} degrees")
+    } else {
+        format!("{what} {slope_degrees:.2} degrees, bed {}", bed + 1)
+    }
 }
 
 fn campaign(
@@ -236,7 +297,9 @@ fn campaign(
         "bed: {} grains over {} fixed, depth {:.4} m, solid fraction {:.4}",
         bed.report.grains, bed.report.base_grains, bed.report.depth, bed.report.solid_fraction
     ));
-    let spec = campaign_spec(scene, body, &bed);
+    let beds = more_beds(body)?.ok_or_else(stopped)?;
+    let settling = bed.report.grain_steps + beds.grain_steps;
+    let spec = campaign_spec(scene, body, &bed, beds);
     let observer = Observer {
         directory,
         bars: Bars::default(),
@@ -288,7 +351,7 @@ fn campaign(
     let mut summary = findings::summarise(scene, &record);
     summary.remarks.extend(remarks);
     summary.model = incline::model(body, &bed);
-    let grain_steps = record.result.cost.grain_steps + bed.report.grain_steps;
+    let grain_steps = record.result.cost.grain_steps + settling;
     summary.cost = Cost::measured(dem_wall, threads, grain_steps, 0);
     let tables = findings::tables(&record);
     run::finish(
@@ -355,6 +418,7 @@ fn rheology_file(
         solid_fraction_error: Some(fit.solid_fraction_error),
         grain_density: Some(body.grains.density),
         valid_i: Some(fit.valid_i),
+        table: friction_table(&result.points),
         identified: Some(fit.identified),
         good: Some(result.verdict.good),
         covariance: Some(fit.covariance),

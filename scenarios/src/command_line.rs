@@ -1,13 +1,17 @@
 //! The command line: what `colluvium` understands, and what each command does.
 
 use crate::calibrate;
+use crate::coarse_grain::{self, Where};
 use crate::failure::Failure;
+use crate::grain_files::Unsaid;
 use crate::pareto;
 use crate::plan;
 use crate::report;
 use crate::run::{self, Ended, RunOptions};
 use crate::scene::{self, Scene};
+use crate::validate;
 use clap::{Args, Parser, Subcommand};
+use colluvium_coupling::coarse_graining::Shape;
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -75,6 +79,22 @@ enum Command {
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
         threads: Option<u16>,
     },
+    /// Fields of grains that lie in files: density, velocity, stress, temperature, fabric, spin, couple stress
+    CoarseGrain(CoarseGrainArguments),
+    /// Run the suites with references and write one report of how far off each figure is
+    Validate {
+        /// Suite: incline [default: all]
+        suite: Option<String>,
+        /// Directory of the runs and the report; what is finished there is not run again
+        #[arg(long, value_name = "DIR", default_value = "results/validate")]
+        out: PathBuf,
+        /// Threads
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+        threads: Option<u16>,
+        /// Change a key of every scene of the suite
+        #[arg(long, value_name = "KEY=VALUE")]
+        set: Vec<String>,
+    },
     /// Write the HTML report of one or more runs
     Report {
         /// Run directories
@@ -120,6 +140,148 @@ fn seconds(text: &str) -> Result<Duration, String> {
         .ok()
         .filter(|d| d.as_secs_f64() <= 1e6)
         .ok_or_else(|| "allowed: [0, 1e6]".into())
+}
+
+#[derive(Debug, Args)]
+struct CoarseGrainArguments {
+    /// grains.vtkhdf of a run, dumps of LAMMPS or LIGGGHTS, legacy VTK files of LIGGGHTS; instants are averaged
+    #[arg(required = true, value_name = "FILE")]
+    files: Vec<PathBuf>,
+    /// Local dump of the contacts beside a text dump
+    #[arg(long, value_name = "FILE")]
+    contacts: Option<PathBuf>,
+    /// Columns of that dump: id1,id2,fx,fy,fz, and tx,ty,tz for torques [default: the first five]
+    #[arg(long, value_name = "NAMES", value_delimiter = ',')]
+    contact_columns: Vec<String>,
+    /// Kernel
+    #[arg(long, value_name = "NAME", value_parser = ["lucy", "gauss", "heaviside", "polynomial"], default_value = "lucy")]
+    kernel: String,
+    /// Radius of the kernel's support, of gauss the standard deviation (m) [default: a diameter, half of one]
+    #[arg(long, value_name = "M")]
+    width: Option<f64>,
+    /// Along z, in x and z, in space, around --axis, or at each --point
+    #[arg(long, value_name = "NAME", value_parser = ["line", "plane", "grid", "cylinder", "points"], default_value = "line")]
+    geometry: String,
+    /// Edge of a cell (m) [default: half a mean diameter]
+    #[arg(long, value_name = "M")]
+    cell: Option<f64>,
+    /// A point (m)
+    #[arg(long, value_name = "X,Y,Z", allow_hyphen_values = true)]
+    point: Vec<String>,
+    /// Where the axis of the cylinder meets z = 0 (m)
+    #[arg(
+        long,
+        value_name = "X,Y",
+        default_value = "0,0",
+        allow_hyphen_values = true
+    )]
+    axis: String,
+    /// Angles around the axis
+    #[arg(long, value_name = "N", default_value_t = 32, value_parser = clap::value_parser!(u16).range(1..=4096))]
+    angles: u16,
+    /// Radii (m) at which the species part: their fields are written one by one
+    #[arg(long, value_name = "R,...", value_delimiter = ',')]
+    species_radii: Vec<f64>,
+    /// The box (m), where the file has none
+    #[arg(
+        long = "box",
+        value_name = "X0,X1,Y0,Y1,Z0,Z1",
+        allow_hyphen_values = true
+    )]
+    domain: Option<String>,
+    /// Periodic axes, where the file does not say: xy, none
+    #[arg(long, value_name = "AXES")]
+    periodic: Option<String>,
+    /// Gravity (m/s²)
+    #[arg(
+        long,
+        value_name = "X,Y,Z",
+        default_value = "0,0,0",
+        allow_hyphen_values = true
+    )]
+    gravity: String,
+    /// Density of the grains (kg/m³), where the file has no masses
+    #[arg(long, value_name = "RHO")]
+    density: Option<f64>,
+    /// Seconds of a step, where the file counts steps
+    #[arg(long, value_name = "S")]
+    timestep: Option<f64>,
+    /// A type of grains that are held fixed
+    #[arg(long, value_name = "TYPE")]
+    fixed_type: Vec<i64>,
+    /// Directory of the tables
+    #[arg(long, value_name = "DIR")]
+    out: PathBuf,
+}
+
+/// Numbers between commas, as many as are wanted.
+fn numbers<const N: usize>(option: &str, text: &str) -> Result<[f64; N], Failure> {
+    let list: Vec<f64> = text
+        .split(',')
+        .filter_map(|word| word.trim().parse().ok())
+        .filter(|x: &f64| x.is_finite())
+        .collect();
+    list.try_into().map_err(|_| {
+        Failure::Input(format!(
+            "{option} {text}: {N} numbers between commas are wanted"
+        ))
+    })
+}
+
+impl CoarseGrainArguments {
+    fn request(&self) -> Result<coarse_grain::Request, Failure> {
+        let domain = self.domain.as_deref().map(|text| {
+            let [a, b, c, d, e, f] = numbers("--box", text)?;
+            Ok::<_, Failure>([[a, c, e], [b, d, f]])
+        });
+        let periodic = self.periodic.as_deref().map(|text| {
+            let known = text == "none" || text.chars().all(|c| "xyz".contains(c));
+            if !known {
+                let why = format!("--periodic {text}: some of x, y and z, or none");
+                return Err(Failure::Input(why));
+            }
+            let has = |c: char| text != "none" && text.contains(c);
+            Ok([has('x'), has('y'), has('z')])
+        });
+        let points = self.point.iter().map(|text| numbers("--point", text));
+        let points: Vec<[f64; 3]> = points.collect::<Result<_, _>>()?;
+        if (self.geometry == "points") != !points.is_empty() {
+            let why = "--point belongs to --geometry points, which needs at least one";
+            return Err(Failure::Input(why.into()));
+        }
+        Ok(coarse_grain::Request {
+            files: self.files.clone(),
+            unsaid: Unsaid {
+                contacts: self.contacts.clone(),
+                contact_columns: self.contact_columns.clone(),
+                domain: domain.transpose()?,
+                periodic: periodic.transpose()?,
+                gravity: numbers("--gravity", &self.gravity)?,
+                density: self.density,
+                timestep: self.timestep,
+                fixed_types: self.fixed_type.clone(),
+            },
+            shape: match self.kernel.as_str() {
+                "gauss" => Shape::Gauss,
+                "heaviside" => Shape::Heaviside,
+                "polynomial" => Shape::Polynomial,
+                _ => Shape::Lucy,
+            },
+            width: self.width,
+            place: match self.geometry.as_str() {
+                "plane" => Where::Plane,
+                "grid" => Where::Grid,
+                "points" => Where::Points(points),
+                "cylinder" => {
+                    Where::Cylinder(numbers("--axis", &self.axis)?, usize::from(self.angles))
+                }
+                _ => Where::Line,
+            },
+            cell: self.cell,
+            species: self.species_radii.clone(),
+            out: self.out.clone(),
+        })
+    }
 }
 
 #[derive(Debug, Args)]
@@ -202,6 +364,29 @@ pub fn execute(line: CommandLine) -> Result<(), Failure> {
             let loaded = scene.load()?;
             let comparison = pareto::Comparison::new(loaded, &vary, &reference)?;
             print(&comparison.run(out, threads.map(usize::from))?);
+        }
+        Command::CoarseGrain(arguments) => {
+            print(&coarse_grain::coarse_grain(&arguments.request()?)?);
+        }
+        Command::Validate {
+            suite,
+            out,
+            threads,
+            set,
+        } => {
+            let options = validate::Options {
+                out,
+                threads: threads.map(usize::from),
+                set,
+            };
+            let (report, missed) = validate::validate(suite.as_deref(), &options)?;
+            print(&report.display().to_string());
+            if missed > 0 {
+                return Err(Failure::Run(format!(
+                    "{missed} figures do not agree with their references; see {}",
+                    report.display()
+                )));
+            }
         }
         Command::Report { directories, out } => {
             let path = report::write_for(&directories, out.as_deref())?;

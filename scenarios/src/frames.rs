@@ -6,7 +6,7 @@
 
 use crate::failure::Failure;
 use crate::vtkhdf::{self, Cells, Field, Frame, Values};
-use colluvium_dem::{Clusters, GrainSample, Partner, Simulation, Snapshot};
+use colluvium_dem::{Clusters, ContactSample, GrainSample, Partner, Simulation, Snapshot};
 use nalgebra::Vector3;
 use std::fs;
 use std::path::{Path, PathBuf};
@@ -206,9 +206,7 @@ enum Kind {
 
 /// One contact or bond: its line, and what acts along it.
 struct Link {
-    ends: [Vector3<f64>; 2],
-    force: Vector3<f64>,
-    overlap: f64,
+    contact: ContactSample,
     kind: Kind,
     stress: [f64; 2],
 }
@@ -216,30 +214,28 @@ struct Link {
 /// Contacts and bonds as lines from centre to centre, to the contact point at walls; a line across a
 /// periodic boundary leaves the box at its second end.
 pub fn contacts(snapshot: &Snapshot) -> Frame {
-    let at = |grain: usize| snapshot.grains[grain].position;
+    let grains = &snapshot.grains;
     let touching = snapshot.contacts.iter().map(|contact| Link {
-        ends: [
-            at(contact.grain),
-            at(contact.grain) + contact.arm - contact.partner_arm,
-        ],
-        force: contact.force,
-        overlap: contact.overlap,
+        contact: *contact,
         kind: match contact.partner {
             Partner::Grain(_) => Kind::Pair,
-            Partner::Wall(_) => Kind::Wall,
+            Partner::Wall(_) | Partner::Body(_) => Kind::Wall,
         },
         stress: [0.0; 2],
     });
     let bonded = snapshot.bonds.iter().map(|bond| Link {
-        ends: [
-            at(bond.grains[0]),
-            at(bond.grains[0]) + bond.arm - bond.partner_arm,
-        ],
-        force: bond.force,
-        overlap: 0.0,
+        contact: bond.as_contact(),
         kind: Kind::Bond,
         stress: [bond.stress.tensile, bond.stress.shear],
     });
+    let ends = |c: &ContactSample| {
+        let at = grains[c.grain].position;
+        [at, at + c.arm - c.partner_arm]
+    };
+    let other = |c: &ContactSample| match c.partner {
+        Partner::Grain(j) => i64::from(grains[j].id),
+        Partner::Wall(_) | Partner::Body(_) => -1,
+    };
     let links: Vec<Link> = touching.chain(bonded).collect();
     let scalars = |read: fn(&Link) -> f64| Values::Scalars(links.iter().map(read).collect());
     Frame {
@@ -247,12 +243,42 @@ pub fn contacts(snapshot: &Snapshot) -> Frame {
         cells: Cells::Lines,
         points: links
             .iter()
-            .flat_map(|link| link.ends)
+            .flat_map(|link| ends(&link.contact))
             .map(Into::into)
             .collect(),
         fields: vec![
-            field("force", "N", vectors(links.iter().map(|link| link.force))),
-            field("overlap", "m", scalars(|link| link.overlap)),
+            field(
+                "force",
+                "N",
+                vectors(links.iter().map(|link| link.contact.force)),
+            ),
+            field("overlap", "m", scalars(|link| link.contact.overlap)),
+            field(
+                "first",
+                "id of the grain the force acts on",
+                Values::Counts(
+                    links
+                        .iter()
+                        .map(|l| i64::from(grains[l.contact.grain].id))
+                        .collect(),
+                ),
+            ),
+            field(
+                "second",
+                "id of the other grain, -1 for a wall",
+                Values::Counts(links.iter().map(|l| other(&l.contact)).collect()),
+            ),
+            field("arm", "m", vectors(links.iter().map(|l| l.contact.arm))),
+            field(
+                "torque",
+                "N m",
+                vectors(links.iter().map(|l| l.contact.torque)),
+            ),
+            field(
+                "other_torque",
+                "N m",
+                vectors(links.iter().map(|l| l.contact.partner_torque)),
+            ),
             field(
                 "kind",
                 "0 pair of grains, 1 wall, 2 bond",

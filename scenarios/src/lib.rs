@@ -8,10 +8,13 @@
 
 pub mod calibrate;
 pub mod checkpoint;
+pub mod coarse_grain;
 pub mod command_line;
 pub mod cost;
 pub mod failure;
 pub mod frames;
+pub mod grain_files;
+pub mod height_files;
 pub mod interruption;
 pub mod journal;
 pub mod mesh_files;
@@ -29,4 +32,5 @@ pub mod start_file;
 pub mod state_hash;
 pub mod summary;
 pub mod table;
+pub mod validate;
 pub mod vtkhdf;

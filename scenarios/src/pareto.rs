@@ -2,6 +2,7 @@
 
 mod observables;
 
+use crate::calibrate;
 use crate::failure::{Failure, Resumes};
 use crate::report;
 use crate::run::{self, RunOptions};
@@ -173,14 +174,16 @@ impl Comparison {
         let one = |label: &str, scene: &Scene| -> Result<PathBuf, Failure> {
             directory.journal.note(&format!("run {label}"));
             let out = Some(directory.path().join(label));
-            run::run(
-                scene,
-                &RunOptions {
-                    out,
-                    threads,
-                    ..RunOptions::default()
-                },
-            )
+            let options = RunOptions {
+                out,
+                threads,
+                ..RunOptions::default()
+            };
+            if self.of_campaigns() {
+                calibrate::calibrate(scene, &options)
+            } else {
+                run::run(scene, &options)
+            }
             .map(|ended| ended.directory)
         };
         let reference = match &self.reference {
@@ -197,7 +200,11 @@ impl Comparison {
             let summary = report::read_summary(&path)?;
             let (error, errors) = match &reference {
                 Some(reference) => {
-                    let errors = errors(&self.scene, &path, reference)?;
+                    let errors = if self.of_campaigns() {
+                        observables::of_campaigns(&path, reference)?
+                    } else {
+                        errors(&self.scene, &path, reference)?
+                    };
                     // A missing value counts as missing, not as the best.
                     let worst = |a: f64, &(_, b): &(String, f64)| {
                         if a.is_nan() || b.is_nan() {
@@ -232,8 +239,14 @@ impl Comparison {
         Ok(rows)
     }
 
+    /// Keys of a campaign are compared by campaigns.
+    fn of_campaigns(&self) -> bool {
+        matches!(self.scene.body, SceneBody::Incline(_)) && self.key.starts_with("calibration.")
+    }
+
     fn compared_with(&self) -> String {
         match &self.reference {
+            Some(_) if self.of_campaigns() => "the reference campaign; largest relative error of the fitted friction over the range of I that both measured, and of the slopes where flow stops and sets off".to_owned(),
             Some(_) => observables::against_reference(&self.scene),
             None => match self.scene.body {
                 SceneBody::Bagnold(_) => "exact profile, relative L2 error of u".to_owned(),

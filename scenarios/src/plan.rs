@@ -1,13 +1,18 @@
 //! The plan of a scene: what would be modelled and why, what is left out, what it would cost.
 
 mod bed;
+mod collapse;
 mod law;
 mod world;
 
+use crate::calibrate;
 use crate::failure::Failure;
 use crate::run;
 use crate::run::step;
-use crate::scene::{BagnoldScene, ImpactScene, InclineScene, InclineStart, Scene, SceneBody};
+use crate::scene::{
+    BagnoldScene, FrictionLaw, ImpactScene, InclineScene, InclineStart, LayerCase, RheologyKeys,
+    Scene, SceneBody,
+};
 use colluvium_coupling::incline::{InclineRun, InclineSpec};
 use colluvium_dem::preparation::settle_incline_bed;
 use colluvium_dem::timestep::Choice;
@@ -20,7 +25,8 @@ use std::time::Instant;
 pub fn plan(scene: &Scene) -> Result<String, Failure> {
     match &scene.body {
         SceneBody::Incline(body) => incline(scene, body),
-        SceneBody::Bagnold(body) => Ok(bagnold(body)),
+        SceneBody::Bagnold(body) => bagnold(body),
+        SceneBody::Collapse(body) => Ok(collapse::collapse(body)),
         SceneBody::Impact(body) => impact(scene, body),
         SceneBody::Chute(body) => bed::chute(body),
         SceneBody::Settle(body) => bed::settle(body),
@@ -36,6 +42,21 @@ impl Lines {
     fn say(&mut self, topic: &str, text: &str) {
         // Writing to a string does not fail.
         let _ = writeln!(self.0, "{topic:<16} {text}");
+    }
+
+    fn say_rheology(&mut self, law: &RheologyKeys) {
+        self.say(
+            "rheology",
+            &format!(
+                "{}{}, d {} m, φ {}, ρ_s {} kg/m³ ({})",
+                law.law.word(),
+                numbers_of_the_law(law),
+                law.diameter,
+                law.solid_fraction,
+                law.grain_density,
+                law.source.as_deref().unwrap_or("by numbers")
+            ),
+        );
     }
 
     /// A step, what is said of it, and every other limit with the step that it would allow.
@@ -180,17 +201,33 @@ fn incline(scene: &Scene, body: &InclineScene) -> Result<String, Failure> {
         "calibrate",
         &format!(
             "flows at {:?} degrees, where a flow stops in [{}, {}], where rest ends in [{}, {}]",
-            c.flow_degrees, c.stop.low, c.stop.high, c.onset.low, c.onset.high
+            calibrate::flow_degrees(body),
+            c.stop.low,
+            c.stop.high,
+            c.onset.low,
+            c.onset.high
+        ),
+    );
+    let [own, best] = calibrate::prospects(body);
+    let tells = |p: &colluvium_coupling::campaign::Prospect| {
+        let [a, b, c] = p.errors;
+        format!("±{a:.3}, ±{b:.3}, ±{c:.3}")
+    };
+    lines.say(
+        "design",
+        &format!(
+            "if the guess is true these flows tell mu_s, mu_2, i_0 to {}; as many D-optimal slopes (flow_degrees = []) to {}",
+            tells(&own),
+            tells(&best)
         ),
     );
     Ok(lines.0)
 }
 
-fn bagnold(body: &BagnoldScene) -> String {
+fn bagnold(body: &BagnoldScene) -> Result<String, Failure> {
     let mut lines = Lines::default();
-    let case = run::bagnold::case(body);
-    let law = case.rheology;
-    let tangent = case.slope.tan();
+    let layer = LayerCase::of(body).map_err(run::bagnold::failure)?;
+    let r = &body.rheology;
     lines.say(
         "scene",
         &format!(
@@ -198,19 +235,7 @@ fn bagnold(body: &BagnoldScene) -> String {
             body.depth, body.slope_degrees
         ),
     );
-    lines.say(
-        "rheology",
-        &format!(
-            "μ_s {}, μ_2 {}, I_0 {}, d {} m, φ {}, ρ_s {} kg/m³ ({})",
-            law.mu_s,
-            law.mu_2,
-            law.i_0,
-            law.diameter,
-            law.solid_fraction,
-            law.grain_density,
-            body.rheology.source.as_deref().unwrap_or("by numbers")
-        ),
-    );
+    lines.say_rheology(&body.rheology);
     let columns = body.grid.columns;
     lines.say(
         "grid",
@@ -225,27 +250,32 @@ fn bagnold(body: &BagnoldScene) -> String {
         ),
     );
     lines.say("left out", &run::bagnold::LEFT_OUT.join(", "));
-    if tangent <= law.mu_s {
-        lines.say("flow", "none: the slope lies below atan(μ_s)");
+    if layer.rests() {
+        lines.say("flow", "none: friction and cohesion hold the layer");
     } else {
-        let inertial_number = law.inertial_number_at(tangent);
+        let inertial_number = run::bagnold::base_inertial_number(body, &layer);
         lines.say(
             "flow",
             &format!(
-                "I = {inertial_number:.4} throughout, {:.4} m/s at the surface (exact), {}",
-                case.exact_velocity(body.depth),
-                if law.well_posedness(inertial_number) < 0.0 {
+                "I = {inertial_number:.4} {}, {:.4} m/s at the surface (exact), {}",
+                if r.cohesion > 0.0 || r.law == FrictionLaw::Coulomb {
+                    "on the base"
+                } else {
+                    "throughout"
+                },
+                layer.surface_velocity(),
+                if layer.base().1 {
                     "well posed"
                 } else {
                     "ill posed in 2D and 3D"
                 }
             ),
         );
-        if let Some(remark) = run::bagnold::validity_remark(body, inertial_number) {
+        if let Some(remark) = run::bagnold::validity_remark(body, &layer, inertial_number) {
             lines.say("warning", &remark);
         }
     }
-    for remark in body.law_remarks() {
+    for remark in body.rheology.remarks() {
         lines.say("warning", &remark);
     }
     let unit = (body.depth / body.gravity).sqrt();
@@ -258,7 +288,24 @@ fn bagnold(body: &BagnoldScene) -> String {
         ),
     );
     lines.say("cost", "well under a second per 1000 cells and 50 steps");
-    lines.0
+    Ok(lines.0)
+}
+
+/// The numbers that the law reads, for a line of text.
+fn numbers_of_the_law(r: &RheologyKeys) -> String {
+    let named = [
+        ("μ_s", r.mu_s),
+        ("μ_2", r.mu_2),
+        ("I_0", r.i_0),
+        ("α", r.alpha),
+        ("μ_∞", r.mu_infinity),
+        ("η (Pa s)", r.viscosity),
+        ("points", r.table.as_ref().map(|t| t.len() as f64)),
+    ];
+    named
+        .iter()
+        .filter_map(|(name, value)| value.map(|v| format!(", {name} {v}")))
+        .collect()
 }
 
 fn impact(scene: &Scene, body: &ImpactScene) -> Result<String, Failure> {

@@ -15,6 +15,11 @@ impl Bar {
         Bar::styled(ProgressBar::new(TICKS), label)
     }
 
+    /// A bar that is not shown.
+    pub fn hidden() -> Bar {
+        Bar(ProgressBar::hidden())
+    }
+
     fn styled(bar: ProgressBar, label: &str) -> Bar {
         let style = ProgressStyle::with_template(
             "{prefix:<24} {bar:32.cyan/black} {percent:>3} %  {elapsed_precise}  {eta_precise} left  {msg}",

@@ -10,6 +10,7 @@ pub const ALTERNATIVES: &[&[&str]] = &[
     &["rheology.file", "rheology.mu_s"],
     &["rheology.file", "rheology.mu_2"],
     &["rheology.file", "rheology.i_0"],
+    &["rheology.file", "rheology.table"],
     &["rheology.file", "rheology.diameter"],
     &["rheology.file", "rheology.solid_fraction"],
     &["rheology.file", "rheology.grain_density"],
@@ -50,6 +51,9 @@ pub struct RheologyFile {
     /// Inertial numbers between which the law was measured.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub valid_i: Option<[f64; 2]>,
+    /// Points (I, μ) of the measured friction, for a scene with `rheology.law = "table"`.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub table: Option<Vec<[f64; 2]>>,
     /// Whether the data determine all three parameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub identified: Option<bool>,
@@ -101,15 +105,26 @@ pub struct Provenance {
     pub verdict: String,
 }
 
+/// Calibrated laws that come with the program, by name: what `rheology.file` may say in the place of a path.
+pub const BUNDLED: [(&str, &str); 1] = [("moderate", include_str!("../rheologies/moderate.toml"))];
+
 impl RheologyFile {
-    /// Reads and checks a file.
+    /// Reads and checks a file, or the bundled law of that name.
     pub fn read(path: &Path) -> Result<RheologyFile, SceneError> {
         let fail = |message: String| SceneError::Rheology {
             path: path.display().to_string(),
             message,
         };
-        let text = std::fs::read_to_string(path)
-            .map_err(|error| fail(format!("cannot read the file: {error}")))?;
+        let bundled = BUNDLED.iter().find(|(name, _)| path == Path::new(name));
+        let text = match bundled {
+            Some((_, text)) if !path.exists() => (*text).to_owned(),
+            _ => std::fs::read_to_string(path).map_err(|error| {
+                let names = BUNDLED.map(|(name, _)| name).join(", ");
+                fail(format!(
+                    "cannot read the file: {error} (bundled laws: {names})"
+                ))
+            })?,
+        };
         let law: RheologyFile =
             toml::from_str(&text).map_err(|error| fail(error.to_string().trim().to_owned()))?;
         law.check().map_err(fail)?;
@@ -189,6 +204,11 @@ impl RheologyFile {
         if let Some(range) = self.valid_i {
             put("valid_i", Value::Array(range.map(Value::Float).to_vec()));
         }
+        if let Some(points) = &self.table {
+            let rows = points.iter();
+            let rows = rows.map(|p| Value::Array(p.map(Value::Float).to_vec()));
+            put("table", Value::Array(rows.collect()));
+        }
         for (key, value) in [("identified", self.identified), ("good", self.good)] {
             if let Some(value) = value {
                 put(key, Value::Boolean(value));
@@ -223,7 +243,7 @@ pub fn drop_stale_notes(below: &mut Table, above: &Table) {
     let Some(Value::Table(below)) = below.get_mut("rheology") else {
         return;
     };
-    let law = ["mu_s", "mu_2", "i_0"];
+    let law = ["mu_s", "mu_2", "i_0", "table"];
     let grains = ["diameter", "solid_fraction", "grain_density"];
     let changes = |keys: &[&str]| keys.iter().any(|k| above.contains_key(*k));
     if changes(&law) {

@@ -4,7 +4,10 @@ mod angle_of_repose;
 pub mod bagnold;
 mod ball_impact;
 pub mod bed;
+mod boulder;
 pub mod chute;
+pub mod collapse;
+mod comet_ball;
 pub mod energy_table;
 pub mod grain_table;
 mod grains;
@@ -16,6 +19,8 @@ pub mod precheck;
 pub mod settle;
 mod silo;
 pub mod step;
+mod tensile;
+mod tumbling_box;
 pub mod world;
 
 use crate::checkpoint::{Checkpoint, Checkpoints};
@@ -226,6 +231,7 @@ pub fn check(scene: &Scene) -> Result<(), Failure> {
         SceneBody::Chute(body) => chute::check(scene, body),
         SceneBody::Settle(body) => settle::check(scene, body),
         SceneBody::Grains(kind) => world::course::check(scene, kind.recipe()),
+        SceneBody::Collapse(body) => collapse::check(scene, body),
     }
 }
 
@@ -274,6 +280,7 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> {
             SceneBody::Chute(body) => chute::run(body, &mut under),
             SceneBody::Settle(body) => settle::run(body, &mut under),
             SceneBody::Grains(kind) => world::course::run(kind.recipe(), &mut under),
+            SceneBody::Collapse(body) => collapse::run(body, &mut under),
         })
     });
     let (begun, wall_s, going_on) = (under.begun, under.wall_s(), under.resumed.is_some());

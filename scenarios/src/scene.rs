@@ -8,25 +8,35 @@ mod angle_of_repose;
 mod bagnold;
 mod ball_impact;
 mod bed;
+mod boulder;
 mod check;
 mod chute;
+mod collapse;
+mod comet;
 mod error;
+mod friction_keys;
 mod grains;
 mod impact;
 mod incline;
 mod kinds;
 mod law;
 mod law_layers;
+mod layer_case;
 pub mod layers;
 mod settle;
 mod silo;
+mod tensile;
+mod tumbling_box;
 pub mod world;
 
 pub use angle_of_repose::AngleOfReposeScene;
-pub use bagnold::{BagnoldGrid, BagnoldScene, RheologyKeys, SolverKeys, SolverMethod};
+pub use bagnold::{BagnoldGrid, BagnoldScene, FrictionLaw, RheologyKeys, SolverKeys, SolverMethod};
 pub use ball_impact::BallImpactScene;
 pub use bed::Pace;
+pub use boulder::BoulderScene;
 pub use chute::ChuteScene;
+pub use collapse::{CollapseGrid, CollapseModel, CollapseScene, CollapseSolver, ThinLayerKind};
+pub use comet::{CometKeys, CometPreparationKeys, MixKind};
 pub use error::SceneError;
 pub use grains::GrainsScene;
 pub use impact::{ImpactScene, RollingKeys};
@@ -38,15 +48,18 @@ pub use kinds::Kind;
 pub use law::{
     CohesionKind, LawKeys, LeverKind, MemoryKind, NormalKind, Parts, RollingKind, TangentialKind,
 };
+pub use layer_case::{LayerCase, LayerVisitor};
 pub use settle::{SettleFloor, SettleGrains, SettleScene};
 pub use silo::SiloScene;
+pub use tensile::{ClampKind, TensileScene};
+pub use tumbling_box::{Attitude, BedKeys, LanderKeys, TumblingBoxScene};
 
 use crate::rheology_file;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// The names and texts of the bundled scenes.
-pub const BUNDLED: [(&str, &str); 12] = [
+pub const BUNDLED: [(&str, &str); 16] = [
     (
         "incline-moderate",
         include_str!("../scenes/incline-moderate.toml"),
@@ -68,12 +81,19 @@ pub const BUNDLED: [(&str, &str); 12] = [
     ("chute", include_str!("../scenes/chute.toml")),
     ("settle", include_str!("../scenes/settle.toml")),
     ("grains", include_str!("../scenes/grains.toml")),
+    ("tensile-test", include_str!("../scenes/tensile-test.toml")),
+    ("boulder-drop", include_str!("../scenes/boulder-drop.toml")),
     (
         "angle-of-repose",
         include_str!("../scenes/angle-of-repose.toml"),
     ),
     ("silo", include_str!("../scenes/silo.toml")),
     ("ball-impact", include_str!("../scenes/ball-impact.toml")),
+    ("tumbling-box", include_str!("../scenes/tumbling-box.toml")),
+    (
+        "column-collapse",
+        include_str!("../scenes/column-collapse.toml"),
+    ),
 ];
 
 /// The text of a bundled scene.
@@ -99,6 +119,8 @@ pub enum SceneBody {
     Settle(Box<SettleScene>),
     /// Grains with walls, bonds, gravity and a preparation.
     Grains(Box<Kind>),
+    /// A column of material that collapses.
+    Collapse(Box<CollapseScene>),
 }
 
 impl SceneBody {
@@ -111,6 +133,7 @@ impl SceneBody {
             SceneBody::Chute(scene) => toml::Table::try_from(scene),
             SceneBody::Settle(scene) => toml::Table::try_from(scene),
             SceneBody::Grains(kind) => kind.to_table(),
+            SceneBody::Collapse(scene) => toml::Table::try_from(scene),
         }
         .unwrap_or_default()
     }
@@ -194,7 +217,7 @@ impl Scene {
         // only the stiffness keys have defaults to drop.
         let kind = family(&name);
         let drops = match kind {
-            Family::Bagnold => &[],
+            Family::Bagnold | Family::Collapse => &[],
             _ => choices,
         };
         let impact = matches!(kind, Family::Impact);
@@ -213,9 +236,12 @@ impl Scene {
                 kinds::anchor(&mut own, folder);
             }
         }
+        // What was written, before a file's numbers take their places.
+        let written = own.clone();
         let mut inputs = Vec::new();
         inputs.extend(rheology_file::resolve(&mut own)?);
         let mut set = layers::parse_settings(settings, option)?;
+        let set_by_hand = set.clone();
         check::check(&set, &schema, option)?;
         layers::check_choices(&set, choices, option)?;
         inputs.extend(rheology_file::resolve(&mut set)?);
@@ -239,6 +265,15 @@ impl Scene {
             }
             law_layers::check_read(&table, &set, (impact, true), option)?;
             law_layers::drop_unread(&mut table, impact);
+        }
+        if matches!(kind, Family::Bagnold | Family::Collapse) {
+            // A bundled scene has the numbers of all laws, as defaults.
+            if folder.is_some() && !friction_keys::chooses(&set) {
+                friction_keys::check_read(&table, &written, origin)?;
+            }
+            friction_keys::check_read(&table, &set_by_hand, option)?;
+            friction_keys::drop_unread(&mut table);
+            friction_keys::check_complete(&table, origin)?;
         }
         check::check(&table, &schema, origin)?;
         check::require(&table, &schema, origin)?;
@@ -298,6 +333,7 @@ impl Scene {
             SceneBody::Chute(scene) => scene.check_together(origin),
             SceneBody::Settle(scene) => scene.check_together(origin),
             SceneBody::Grains(kind) => kind.check_together(origin),
+            SceneBody::Collapse(scene) => scene.check_together(origin),
         }
     }
 }
@@ -346,6 +382,7 @@ fn body(name: &str, table: &toml::Table) -> Result<SceneBody, String> {
             Some(kind) => SceneBody::Grains(Box::new(kind.map_err(plain)?)),
             None => return Err(format!("no scene is called `{name}`")),
         },
+        Family::Collapse => SceneBody::Collapse(table.try_into().map_err(plain)?),
     })
 }
 
@@ -363,6 +400,7 @@ enum Family {
     Chute,
     Settle,
     Grains,
+    Collapse,
 }
 
 /// What a scene of this kind builds on. A `grains` scene stands for itself: walls and grains of the
@@ -381,6 +419,7 @@ fn family(name: &str) -> Family {
         "chute" => Family::Chute,
         "settle" => Family::Settle,
         _ if Kind::NAMES.contains(&name) => Family::Grains,
+        "column-collapse" => Family::Collapse,
         _ => Family::Incline,
     }
 }
@@ -393,7 +432,7 @@ fn alternatives(name: &str) -> &'static [&'static [&'static str]] {
             "contact.stiffness",
             "contact.stiffness_from_speed",
         ]],
-        Family::Bagnold => rheology_file::ALTERNATIVES,
+        Family::Bagnold | Family::Collapse => rheology_file::ALTERNATIVES,
         Family::Impact | Family::Grains => &law::CHOICES,
         Family::Chute | Family::Settle => &BED_CHOICES,
     }
@@ -416,6 +455,7 @@ fn body_schema(name: &str) -> Value {
         Family::Chute => schemars::schema_for!(ChuteScene),
         Family::Settle => schemars::schema_for!(SettleScene),
         Family::Grains => return Kind::schema(name).unwrap_or_default(),
+        Family::Collapse => schemars::schema_for!(CollapseScene),
     };
     schema.to_value()
 }

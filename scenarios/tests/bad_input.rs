@@ -140,6 +140,33 @@ const CASES: &[(&[&str], &[&str])] = &[
         &["rheology.mu_2", "0.1", "0.506"],
     ),
     (
+        &["run", "bagnold", "--set", "rheology.law=coulombe"],
+        &["rheology.law", "coulombe", "barker-gray"],
+    ),
+    (
+        &["run", "bagnold", "--set", "rheology.alpha=1.5"],
+        &["rheology.alpha", "1.5", "mu-i", "mu_s, mu_2, i_0"],
+    ),
+    (
+        &["run", "bagnold", "--set", "rheology.law=table"],
+        &["rheology.table", "missing", "[[I, mu], ...]"],
+    ),
+    (
+        &[
+            "run",
+            "bagnold",
+            "--set",
+            "rheology.law=table",
+            "--set",
+            "rheology.table=[[0, 0.5], [0.1, 0.4]]",
+        ],
+        &["rheology.table", "0.4", "the point before, 0.5"],
+    ),
+    (
+        &["run", "bagnold", "--set", "rheology.law=coulomb"],
+        &["slope_degrees", "33", "26.8394"],
+    ),
+    (
         &["run", "bagnold", "--set", "rheology.file=missing.toml"],
         &["rheology.file", "missing.toml", "cannot read"],
     ),

@@ -131,6 +131,56 @@ fn other_numbers_over_a_rheology_file_drop_what_it_says_of_its_own() {
     }
 }
 
+/// Each law of the layer runs and meets its exact profile; the resolved scene holds what the law
+/// reads and nothing else, and a rheology file feeds the law that the scene names.
+#[test]
+fn layer_takes_every_law_of_friction() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(
+        folder.path().join("law.toml"),
+        "mu_s = 0.4\nmu_2 = 0.8\ni_0 = 0.3\ndiameter = 0.01\nsolid_fraction = 0.5\n\
+         table = [[0.0, 0.4], [0.1, 0.5], [0.5, 0.65], [1.0, 0.7]]\n",
+    )
+    .unwrap();
+    let cases: [(&str, &[&str], &[&str]); 4] = [
+        (
+            "a",
+            &["rheology.law=barker-gray"],
+            &["alpha", "mu_infinity"],
+        ),
+        (
+            "b",
+            &[
+                "rheology.law=coulomb",
+                "rheology.mu_s=0.3",
+                "rheology.viscosity=5",
+            ],
+            &["mu_s", "viscosity"],
+        ),
+        (
+            "c",
+            &["rheology.file=law.toml", "rheology.law=table"],
+            &["table"],
+        ),
+        ("d", &["rheology.file=law.toml"], &["mu_s", "mu_2", "i_0"]),
+    ];
+    for (out, settings, keys) in cases {
+        let mut arguments = vec!["run", "bagnold", "--out", out];
+        for setting in settings {
+            arguments.extend(["--set", setting]);
+        }
+        succeed(folder.path(), &arguments);
+        let error = &summary(&folder.path().join(out))["results"]["velocity_error_l2"]["value"];
+        assert!(error.as_f64().unwrap() < 2e-4, "{settings:?}: {error}");
+        let scene = std::fs::read_to_string(folder.path().join(out).join("scene.toml")).unwrap();
+        for key in ["mu_s", "mu_2", "alpha", "mu_infinity", "viscosity", "table"] {
+            let is_there = scene.contains(&format!("\n{key} = "));
+            let is_read = keys.contains(&key) || (out == "a" && key.starts_with("mu_"));
+            assert_eq!(is_there, is_read, "{out} {key}\n{scene}");
+        }
+    }
+}
+
 #[test]
 fn a_fast_rolling_spring_shortens_the_step() {
     let folder = tempfile::tempdir().unwrap();

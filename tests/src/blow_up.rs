@@ -216,6 +216,7 @@ impl Trial {
             law: self.law.into(),
             grains: vec![grain],
             walls: vec![Wall::plane(Vector3::zeros(), Vector3::z())],
+            bodies: Vec::new(),
             timestep: step,
             threads: Threads::Serial,
         })?;
@@ -260,6 +261,7 @@ impl Trial {
             law: self.law.into(),
             grains: packing.grains.clone(),
             walls: Vec::new(),
+            bodies: Vec::new(),
             timestep,
             threads: Threads::Serial,
         }

@@ -76,6 +76,7 @@ impl Gas {
                 periodic: [true; 3],
             },
             gravity: Vector3::zeros(),
+            bodies: Vec::new(),
             timestep: law.contact_time(0.5, 0.25, 1.0) / self.steps_per_contact,
             law: law.into(),
             grains,

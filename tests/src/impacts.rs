@@ -28,6 +28,7 @@ pub fn scene(law: impl Into<Laws>, grains: Vec<Grain>, walls: Vec<Wall>, timeste
         law: law.into(),
         grains,
         walls,
+        bodies: Vec::new(),
         timestep,
         threads: Threads::Serial,
     }

@@ -114,6 +114,7 @@ impl Column {
                 wall([0.0, 0.0], [0.0, 1.0]),
                 wall([0.0, edge], [0.0, -1.0]),
             ],
+            bodies: Vec::new(),
             timestep: step(),
             threads: Threads::Serial,
         })
@@ -152,7 +153,7 @@ impl Loads {
         for c in &snapshot.contacts {
             let g = &snapshot.grains[c.grain];
             match c.partner {
-                Partner::Wall(_) => {
+                Partner::Wall(_) | Partner::Body(_) => {
                     add(g.position.z, 1, c.force.z);
                     add(g.position.z, 2, c.force.xy().norm());
                 }
@@ -295,6 +296,7 @@ impl Hopper {
             law: round(0.5).into(),
             grains: self.bottom().chain(grains).collect(),
             walls: vec![],
+            bodies: Vec::new(),
             timestep: step(),
             threads: Threads::Serial,
         })?;

@@ -436,7 +436,7 @@ fn a_stack_at_rest_stores_what_theory_says() {
         for c in &look(&mut run).contacts {
             let k = match c.partner {
                 Partner::Grain(j) => c.grain.max(j),
-                Partner::Wall(_) => 0,
+                Partner::Wall(_) | Partner::Body(_) => 0,
             };
             let force = mass() * G * (n as usize - k) as f64;
             assert_close("force", c.force.z.abs(), force, 1e-9);

@@ -37,6 +37,7 @@ fn setup(law: impl Into<Laws>, grains: Vec<Grain>, walls: Vec<Wall>, gravity: f6
         law: law.into(),
         grains,
         walls,
+        bodies: Vec::new(),
         timestep: 1.0,
         threads: Threads::Serial,
     }
@@ -331,7 +332,7 @@ fn a_column_a_thousand_high_rests_on_the_sum_of_its_weights() {
         let a = snapshot.grains[c.grain].id;
         match c.partner {
             Partner::Grain(b) => a.max(snapshot.grains[b].id),
-            Partner::Wall(_) => 0,
+            Partner::Wall(_) | Partner::Body(_) => 0,
         }
     };
     for contact in &snapshot.contacts {

@@ -94,6 +94,7 @@ fn rain() -> Simulation {
         law: law.into(),
         grains,
         walls: vec![Wall::plane(Vector3::zeros(), Vector3::z())],
+        bodies: Vec::new(),
         timestep: 1e-4,
         threads: Threads::Serial,
     };
@@ -213,11 +214,13 @@ fn frames_of_a_run_are_joined_and_single_ones_go() {
     let third = single.join("grains_000000000050.vtkhdf");
     let kept = std::fs::read(&third).unwrap();
     std::fs::write(&third, &kept[..kept.len() / 2]).unwrap();
-    let error = frames.join().unwrap_err().to_string();
+    let error = frames.join(rain.steps_done()).unwrap_err().to_string();
     assert!(error.contains("grains_000000000050"), "{error}");
     assert_eq!(std::fs::read_dir(&single).unwrap().count(), 10);
     std::fs::write(&third, kept).unwrap();
-    frames.join().unwrap();
+    frames.join(rain.steps_done()).unwrap();
+    assert_eq!(std::fs::read_dir(&single).unwrap().count(), 10);
+    frames::remove(folder.path()).unwrap();
     assert!(!single.exists());
     assert!(folder.path().join("contacts.vtkhdf").exists());
 }

@@ -149,6 +149,7 @@ fn setup(law: &Laws) -> Result<Setup, Box<dyn Error>> {
         law: law.clone(),
         grains,
         walls: Vec::new(),
+        bodies: Vec::new(),
         timestep: 1e-4,
         threads: Threads::Serial,
     })

@@ -102,6 +102,7 @@ fn setup(case: &Case, timestep: f64, threads: Threads) -> Setup {
         law: law(case).into(),
         grains: case.grains.clone(),
         walls: walls.collect(),
+        bodies: Vec::new(),
         timestep,
         threads,
     }

@@ -5,11 +5,12 @@
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::ldlt::factor::LdltRegularization;
 use faer::sparse::linalg::cholesky::{
-    LdltRef, SymbolicCholesky, SymmetricOrdering, factorize_symbolic_cholesky,
+    LdltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 
+use super::substitution::substitute;
 use crate::error::Error;
 
 /// LDLᵀ factors of the lower triangle of a matrix of fixed pattern, with −δ on the diagonal of the
@@ -23,6 +24,9 @@ pub(super) struct QuasiDefinite {
     definite: usize,
     regularisation: f64,
     scratch: MemBuffer,
+    /// A right-hand side in the order of the factors.
+    ordered: Vec<f64>,
+    work: Vec<f64>,
 }
 
 /// Pivots smaller than this, or of the wrong sign by round-off, are replaced by it.
@@ -58,6 +62,8 @@ impl QuasiDefinite {
             definite,
             regularisation,
             scratch,
+            ordered: vec![0.0; pattern.nrows()],
+            work: Vec::new(),
         })
     }
 
@@ -90,6 +96,19 @@ impl QuasiDefinite {
 
     /// Overwrites x with S⁻¹ x; there must be factors.
     pub(super) fn solve(&mut self, x: &mut [f64]) {
+        if let (SymbolicCholeskyRaw::Supernodal(supernodes), Some(order)) =
+            (self.symbolic.raw(), self.symbolic.perm())
+        {
+            let (forward, _) = order.arrays();
+            for (y, &from) in self.ordered.iter_mut().zip(forward) {
+                *y = x[from];
+            }
+            substitute(supernodes, &self.factors, &mut self.ordered, &mut self.work);
+            for (y, &to) in self.ordered.iter().zip(forward) {
+                x[to] = *y;
+            }
+            return;
+        }
         let rows = x.len();
         LdltRef::new(&self.symbolic, &self.factors).solve_in_place_with_conj(
             Conj::No,

@@ -2,7 +2,8 @@
 
 use serde::{Deserialize, Serialize};
 
-use super::{Rheology, Threshold, well_posedness};
+use super::friction::validate_grains;
+use super::{Rheology, ShearLaw, Threshold, well_posedness};
 use crate::error::{Error, require};
 use crate::units::Units;
 
@@ -69,24 +70,17 @@ impl MuI {
             self.mu_2,
             format!("at least rheology.mu_s = {} and finite", self.mu_s),
         )?;
-        for (key, value) in [
-            ("rheology.i_0", self.i_0),
-            ("rheology.diameter", self.diameter),
-            ("rheology.grain_density", self.grain_density),
-        ] {
-            require(value > 0.0, key, value, "greater than 0 and finite")?;
-        }
         require(
-            self.solid_fraction > 0.0 && self.solid_fraction <= 1.0,
-            "rheology.solid_fraction",
-            self.solid_fraction,
-            "greater than 0, at most 1",
+            self.i_0 > 0.0,
+            "rheology.i_0",
+            self.i_0,
+            "greater than 0 and finite",
         )?;
-        require(
-            self.cohesion >= 0.0,
-            "rheology.cohesion",
+        validate_grains(
+            self.diameter,
+            self.solid_fraction,
+            self.grain_density,
             self.cohesion,
-            "at least 0 and finite",
         )
     }
 
@@ -159,10 +153,6 @@ impl Rheology for MuI {
             - pressure * (self.mu_2 - self.mu_s) * a * (rate / a).ln_1p()
     }
 
-    fn is_well_posed(&self, rate: f64, pressure: f64) -> bool {
-        pressure > 0.0 && self.well_posedness(self.inertial_number(rate, pressure)) < 0.0
-    }
-
     fn in_units(&self, units: &Units) -> Self {
         Self {
             diameter: self.diameter / units.length,
@@ -173,8 +163,38 @@ impl Rheology for MuI {
     }
 }
 
+impl ShearLaw for MuI {
+    fn validate(&self) -> Result<(), Error> {
+        MuI::validate(self)
+    }
+
+    fn bulk_density(&self) -> f64 {
+        MuI::bulk_density(self)
+    }
+
+    fn friction_limits(&self) -> [f64; 2] {
+        [self.mu_s, self.mu_2]
+    }
+
+    fn cohesion(&self) -> f64 {
+        self.cohesion
+    }
+
+    fn rate_under(&self, shear_stress: f64, pressure: f64) -> f64 {
+        let mu = (shear_stress - self.cohesion) / pressure;
+        if mu <= self.mu_s {
+            0.0
+        } else if mu >= self.mu_2 {
+            f64::INFINITY
+        } else {
+            self.inertial_number_at(mu) * (pressure / self.grain_density).sqrt() / self.diameter
+        }
+    }
+}
+
 #[cfg(test)]
 mod tests {
+    use super::super::laws_under_test::{derivatives_agree, rate_inverts_the_threshold, scales};
     use super::*;
 
     fn glass() -> MuI {
@@ -198,20 +218,12 @@ mod tests {
     }
 
     #[test]
-    fn derivatives_agree_with_differences() {
-        let law = glass();
+    fn derivatives_potential_inverse_and_units() {
         for (rate, pressure) in [(0.3, 5.0), (37.0, 420.0), (2e3, 80.0)] {
-            let exact = law.threshold(rate, pressure);
-            let step = 1e-5;
-            let difference = |f: &dyn Fn(f64) -> f64| (f(step) - f(-step)) / (2.0 * step);
-            let by_rate = difference(&|e| law.threshold(rate * (1.0 + e), pressure).stress) / rate;
-            let by_pressure =
-                difference(&|e| law.threshold(rate, pressure * (1.0 + e)).stress) / pressure;
-            let potential = difference(&|e| law.potential(rate * (1.0 + e), pressure)) / rate;
-            assert!((by_rate / exact.by_rate - 1.0).abs() < 1e-6);
-            assert!((by_pressure / exact.by_pressure - 1.0).abs() < 1e-6);
-            assert!((potential / exact.stress - 1.0).abs() < 1e-6);
+            derivatives_agree(&glass(), rate, pressure);
+            rate_inverts_the_threshold(&glass(), rate, pressure);
         }
+        scales(&glass());
     }
 
     #[test]
@@ -220,17 +232,6 @@ mod tests {
         assert_eq!((at_zero.stress, at_zero.by_rate), (12.0, 0.0));
         let near_zero = glass().threshold(10.0, 1e-12);
         assert!((near_zero.stress - 12.0).abs() < 1e-11 && near_zero.by_pressure.is_finite());
-    }
-
-    #[test]
-    fn law_does_not_depend_on_the_units() {
-        let law = glass();
-        let units = Units::of_gravity(3.0, law.bulk_density(), 1.8e-4);
-        let scaled = law.in_units(&units);
-        let (rate, pressure) = (1e-3, 0.4);
-        let natural = scaled.threshold(rate * units.time(), pressure / units.stress());
-        let direct = law.threshold(rate, pressure).stress;
-        assert!((natural.stress * units.stress() / direct - 1.0).abs() < 1e-13);
     }
 
     #[test]

@@ -12,6 +12,8 @@ pub(super) struct StepMatrix {
     pub(super) system: SparseSystem,
     mass: Vec<usize>,
     divergence: Vec<[usize; 2]>,
+    /// Slots of the diagonal of the cells.
+    diagonal: Vec<usize>,
     /// Slots of all points, one after the other: for each velocity of the point (row), its
     /// velocities and then its pressures (columns).
     points: Vec<usize>,
@@ -21,8 +23,8 @@ impl StepMatrix {
     /// The matrix of one grid, to be solved to a relative residual `tolerance` where it is solved
     /// iteratively.
     pub(super) fn new(discretisation: &Discretisation, tolerance: f64) -> Result<Self, Error> {
-        let velocities = discretisation.grid().velocities();
-        let size = velocities + discretisation.grid().cells();
+        let velocities = discretisation.velocities();
+        let size = velocities + discretisation.cells();
         let mut entries: Vec<(usize, usize)> = (0..velocities).map(|j| (j, j)).collect();
         for &(cell, j, _) in discretisation.divergence() {
             entries.push((j, velocities + cell));
@@ -35,8 +37,10 @@ impl StepMatrix {
                 entries.extend(cells.iter().map(|&cell| (row, velocities + cell)));
             }
         }
+        entries.extend((velocities..size).map(|i| (i, i)));
         let (system, slots) =
             SparseSystem::new(size, &entries, method_for(discretisation, tolerance))?;
+        let (slots, diagonal) = slots.split_at(entries.len() - discretisation.cells());
         let (mass, rest) = slots.split_at(velocities);
         let (divergence, points) = rest.split_at(2 * discretisation.divergence().len());
         Ok(Self {
@@ -44,14 +48,17 @@ impl StepMatrix {
             mass: mass.to_vec(),
             divergence: divergence.chunks_exact(2).map(|c| [c[0], c[1]]).collect(),
             points: points.to_vec(),
+            diagonal: diagonal.to_vec(),
         })
     }
 
-    /// Fills the matrix; `law` gives C and g at each point.
+    /// Fills the matrix; `law` gives C and g at each point. Where a cell is released its pressure
+    /// is zero and its divergence free.
     pub(super) fn fill(
         &mut self,
         discretisation: &Discretisation,
         dt: f64,
+        released: &[bool],
         law: impl Fn(usize) -> ([[f64; COMPONENTS]; COMPONENTS], [f64; COMPONENTS]),
     ) {
         let values = self.system.values_mut();
@@ -59,9 +66,19 @@ impl StepMatrix {
         for (&slot, m) in self.mass.iter().zip(discretisation.mass()) {
             values[slot] += m / dt;
         }
-        for (slots, &(_, _, area)) in self.divergence.iter().zip(discretisation.divergence()) {
-            values[slots[0]] -= area;
-            values[slots[1]] -= area;
+        let entries = discretisation
+            .divergence()
+            .iter()
+            .zip(discretisation.gradient());
+        for (slots, (&(cell, _, area), force)) in self.divergence.iter().zip(entries) {
+            values[slots[0]] -= force;
+            if !released[cell] {
+                values[slots[1]] -= area;
+            }
+        }
+        let volume = discretisation.grid().cell_volume();
+        for (&slot, _) in self.diagonal.iter().zip(released).filter(|(_, r)| **r) {
+            values[slot] -= volume;
         }
         let mut slots = self.points.iter();
         for (q, point) in discretisation.points().iter().enumerate() {
@@ -97,7 +114,7 @@ fn method_for(discretisation: &Discretisation, tolerance: f64) -> Method {
         Method::Direct
     } else {
         Method::Preconditioned {
-            definite: grid.velocities(),
+            definite: discretisation.velocities(),
             regularisation: PRESSURE_REGULARISATION * grid.cell_volume(),
             tolerance,
         }

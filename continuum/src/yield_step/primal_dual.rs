@@ -37,6 +37,9 @@ pub struct PrimalDualOptions {
     /// Tolerance of the stress law, relative; raised to the round-off of γ/ε where that is larger.
     /// A miss of this size shifts γ̇ by κ/κ_γ times as much, hundreds of times in slow flow.
     pub stress_tolerance: f64,
+    /// Whether pressure is one-sided: p ≥ 0 and ∇·u ≥ 0, one of them zero, so that matter that is
+    /// pulled apart falls freely instead of being held by suction.
+    pub one_sided_pressure: bool,
 }
 
 impl Default for PrimalDualOptions {
@@ -49,6 +52,7 @@ impl Default for PrimalDualOptions {
             momentum_tolerance: 1e-9,
             divergence_tolerance: 1e-9,
             stress_tolerance: 1e-8,
+            one_sided_pressure: false,
         }
     }
 }
@@ -88,6 +92,8 @@ pub struct PrimalDual {
     matrix: StepMatrix,
     trial: FlowState,
     points: Vec<LinearisedPoint>,
+    /// Cells without pressure that may dilate.
+    released: Vec<bool>,
     right_hand_side: Vec<f64>,
     change: Vec<f64>,
     candidate: Vec<f64>,
@@ -116,13 +122,14 @@ impl PrimalDual {
             options.floor_factor,
             "between 0 and 1, both excluded",
         )?;
-        let velocities = discretisation.grid().velocities();
-        let cells = discretisation.grid().cells();
+        let velocities = discretisation.velocities();
+        let cells = discretisation.cells();
         Ok(Self {
             options,
             matrix: StepMatrix::new(discretisation, NEWTON_TOLERANCE)?,
             trial: FlowState::at_rest(discretisation, vec![0.0; cells]),
             points: vec![LinearisedPoint::default(); discretisation.points().len()],
+            released: vec![false; cells],
             right_hand_side: vec![0.0; velocities + cells],
             change: vec![0.0; velocities + cells],
             candidate: vec![0.0; velocities],
@@ -140,7 +147,8 @@ impl PrimalDual {
     ) {
         self.trial.clone_from(start);
         let mut floor = strategy.first_floor;
-        for _ in 0..strategy.max_iterations {
+        for iteration in 0..strategy.max_iterations {
+            self.release(problem.discretisation, iteration == 0);
             self.linearise(problem, floor);
             self.assemble(problem, &start.u);
             report.iterations += 1;
@@ -197,14 +205,15 @@ impl PrimalDual {
     fn assemble<R: Rheology>(&mut self, problem: &StepProblem<'_, R>, u_old: &[f64]) {
         let discretisation = problem.discretisation;
         let linear = &self.points;
-        self.matrix.fill(discretisation, problem.dt, |q| {
-            let mut c = linear[q].by_rate;
-            let mean = 0.5 * (c[0][1] + c[1][0]);
-            c[0][1] = mean;
-            c[1][0] = mean;
-            (c, linear[q].by_pressure)
-        });
-        let velocities = discretisation.grid().velocities();
+        self.matrix
+            .fill(discretisation, problem.dt, &self.released, |q| {
+                let mut c = linear[q].by_rate;
+                let mean = 0.5 * (c[0][1] + c[1][0]);
+                c[0][1] = mean;
+                c[1][0] = mean;
+                (c, linear[q].by_pressure)
+            });
+        let velocities = discretisation.velocities();
         let (momentum, continuity) = self.right_hand_side.split_at_mut(velocities);
         let mass = discretisation.mass();
         for (j, r) in momentum.iter_mut().enumerate() {
@@ -217,10 +226,42 @@ impl PrimalDual {
                         + point.rates(1)[slot] * linear.stress[1]);
             }
         }
-        for &(cell, j, area) in discretisation.divergence() {
-            momentum[j] += area * self.trial.p[cell];
+        let forces = discretisation
+            .divergence()
+            .iter()
+            .zip(discretisation.gradient());
+        for (&(cell, j, _), force) in forces {
+            momentum[j] += force * self.trial.p[cell];
         }
+        let volume = discretisation.grid().cell_volume();
+        for ((r, p), _) in continuity
+            .iter_mut()
+            .zip(&self.trial.p)
+            .zip(&self.released)
+            .filter(|(_, released)| **released)
+        {
+            *r = volume * p;
+        }
+    }
+
+    /// Decides which cells let go: those that would have to be pulled together to keep their
+    /// volume (p ≥ 0 and ∇·u ≥ 0 complement each other). Fills the continuity part of the
+    /// right-hand side.
+    /// The first iteration goes by the pressure alone, because the velocity that a step begins with
+    /// has a divergence of its own.
+    fn release(&mut self, discretisation: &Discretisation, is_first: bool) {
+        let continuity = &mut self.right_hand_side[self.trial.u.len()..];
         divergence_residual(discretisation, &self.trial.u, continuity);
+        if self.options.one_sided_pressure {
+            let volume = discretisation.grid().cell_volume();
+            for ((released, p), d) in self.released.iter_mut().zip(&self.trial.p).zip(continuity) {
+                *released = if is_first {
+                    *p <= 0.0
+                } else {
+                    p - *d / volume <= 0.0
+                };
+            }
+        }
     }
 
     /// Largest fraction 1, ½, ¼, ⅛ of the change of velocity with which the convex functional of
@@ -257,7 +298,7 @@ impl PrimalDual {
         let points = problem.discretisation.points();
         for ((point, linear), s) in points.iter().zip(&self.points).zip(&mut self.trial.s) {
             let rate = point.strain_rate_change(du);
-            let pressure = point.pressure(dp);
+            let pressure = point.pressure_change(dp);
             for (a, s) in s.iter_mut().enumerate() {
                 let target = linear.stress[a]
                     + linear.by_rate[a][0] * rate[0]
@@ -271,6 +312,9 @@ impl PrimalDual {
         }
         for (p, d) in self.trial.p.iter_mut().zip(dp) {
             *p += d;
+            if self.options.one_sided_pressure {
+                *p = p.max(0.0);
+            }
         }
         for (point, s) in points.iter().zip(&mut self.trial.s) {
             let (_, _, threshold) =
@@ -291,7 +335,8 @@ impl PrimalDual {
         u_old: &[f64],
         floor: f64,
     ) -> Residuals {
-        let (momentum, continuity) = self.right_hand_side.split_at_mut(self.trial.u.len());
+        let divergence = self.continuity_residual(problem.discretisation);
+        let momentum = &mut self.right_hand_side[..self.trial.u.len()];
         let mut stress = 0.0;
         for (point, s) in problem.discretisation.points().iter().zip(&self.trial.s) {
             let (gamma, rate, threshold) =
@@ -305,10 +350,28 @@ impl PrimalDual {
         }
         Residuals {
             momentum: momentum_residual(problem, u_old, &self.trial, momentum),
-            divergence: divergence_residual(problem.discretisation, &self.trial.u, continuity),
+            divergence,
             stress,
             strain_rate_floor: floor,
         }
+    }
+
+    /// Largest |∇·u|, or largest miss of p ≥ 0 ⟂ ∇·u ≥ 0.
+    fn continuity_residual(&mut self, discretisation: &Discretisation) -> f64 {
+        let continuity = &mut self.right_hand_side[self.trial.u.len()..];
+        let divergence = divergence_residual(discretisation, &self.trial.u, continuity);
+        if !self.options.one_sided_pressure {
+            return divergence;
+        }
+        let volume = discretisation.grid().cell_volume();
+        self.trial
+            .p
+            .iter()
+            .zip(continuity)
+            .fold(0.0, |largest, (p, d)| {
+                let d = *d / volume;
+                largest_or_nan(largest, if p - d <= 0.0 { *p } else { d })
+            })
     }
 
     fn is_converged<R>(&self, problem: &StepProblem<'_, R>, residuals: &Residuals) -> bool {
@@ -342,7 +405,7 @@ fn evaluate<R: Rheology>(
     let gamma = point.strain_rate(u);
     let rate = (gamma[0] * gamma[0] + gamma[1] * gamma[1] + floor * floor).sqrt();
     let (pressure, depends) = threshold_pressure(point.pressure(p));
-    let mut threshold = rheology.threshold(rate, pressure);
+    let mut threshold = point.law.threshold(rheology, rate, pressure);
     if !depends {
         threshold.by_pressure = 0.0;
     }
@@ -373,7 +436,7 @@ fn functional<R: Rheology>(
             let gamma = point.strain_rate(u);
             let rate = (gamma[0] * gamma[0] + gamma[1] * gamma[1] + floor * floor).sqrt();
             let (pressure, _) = threshold_pressure(point.pressure(p));
-            point.weight * problem.rheology.potential(rate, pressure)
+            point.weight * point.law.potential(problem.rheology, rate, pressure)
         })
         .sum();
     kinetic + dissipated
@@ -408,8 +471,9 @@ impl<R: Rheology> YieldSolver<R> for PrimalDual {
                 line_search: true,
             },
         ];
-        // Without stress there is nothing warm to start from.
-        let is_cold = state.s.iter().all(|s| *s == [0.0; COMPONENTS]);
+        // Without stress there is nothing warm to start from, unless the material has none.
+        let is_cold = state.s.iter().all(|s| *s == [0.0; COMPONENTS])
+            && problem.rheology.threshold(1.0, 1.0).stress > 0.0;
         let mut report = StepReport::default();
         for strategy in &strategies[usize::from(is_cold)..] {
             self.attempt(problem, state, strategy, &mut report);

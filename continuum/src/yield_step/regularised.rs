@@ -47,6 +47,8 @@ pub struct RegularisedViscosity {
     matrix: StepMatrix,
     trial: FlowState,
     viscosity: Vec<f64>,
+    /// No cell: here the pressure has no lower bound.
+    released: Vec<bool>,
     right_hand_side: Vec<f64>,
     change: Vec<f64>,
 }
@@ -72,13 +74,14 @@ impl RegularisedViscosity {
             options.passes as f64,
             "at least 1",
         )?;
-        let cells = discretisation.grid().cells();
-        let size = discretisation.grid().velocities() + cells;
+        let cells = discretisation.cells();
+        let size = discretisation.velocities() + cells;
         Ok(Self {
             options,
             matrix: StepMatrix::new(discretisation, LINEAR_TOLERANCE)?,
             trial: FlowState::at_rest(discretisation, vec![0.0; cells]),
             viscosity: vec![0.0; discretisation.points().len()],
+            released: vec![false; cells],
             right_hand_side: vec![0.0; size],
             change: vec![0.0; size],
         })
@@ -89,7 +92,7 @@ impl RegularisedViscosity {
         for (point, viscosity) in points.iter().zip(&mut self.viscosity) {
             let rate = strain_rate_norm(point.strain_rate(&self.trial.u));
             let (pressure, _) = threshold_pressure(point.pressure(&self.trial.p));
-            let stress = problem.rheology.threshold(rate, pressure).stress;
+            let stress = point.law.threshold(problem.rheology, rate, pressure).stress;
             // The comparison form of the minimum has no division by a strain rate of zero.
             *viscosity = if stress < self.options.largest_viscosity * rate {
                 stress / rate
@@ -131,17 +134,18 @@ impl<R: Rheology> YieldSolver<R> for RegularisedViscosity {
         state: &mut FlowState,
     ) -> Result<StepReport, Error> {
         let discretisation = problem.discretisation;
-        let velocities = discretisation.grid().velocities();
+        let velocities = discretisation.velocities();
         self.trial.clone_from(state);
         let mut report = StepReport::default();
         for _ in 0..self.options.passes {
             self.evaluate_viscosity(problem);
             self.evaluate_stress(problem);
             let viscosity = &self.viscosity;
-            self.matrix.fill(discretisation, problem.dt, |q| {
-                let eta = viscosity[q];
-                ([[eta, 0.0], [0.0, eta]], [0.0; COMPONENTS])
-            });
+            self.matrix
+                .fill(discretisation, problem.dt, &self.released, |q| {
+                    let eta = viscosity[q];
+                    ([[eta, 0.0], [0.0, eta]], [0.0; COMPONENTS])
+                });
             let (momentum, continuity) = self.right_hand_side.split_at_mut(velocities);
             momentum_residual(problem, &state.u, &self.trial, momentum);
             momentum.iter_mut().for_each(|r| *r = -*r);

@@ -4,6 +4,10 @@ use super::least_squares::{FitError, Solution, levenberg_marquardt};
 use super::points::LocalPoint;
 use nalgebra::{Matrix3, SVector, Vector3};
 use serde::{Deserialize, Serialize};
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+/// Gauss' cumulative probability at one standard deviation.
+pub(super) const ONE_SIGMA: f64 = 0.841_344_746_068_543;
 
 /// Which friction the fit describes.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
@@ -47,6 +51,9 @@ pub struct MuIFit {
     pub rms_residual: f64,
     /// How much wider the errors are than counting statistics alone.
     pub error_scale: f64,
+    /// Degrees of freedom behind that, where it comes from the scatter between runs: then errors are Student's.
+    #[serde(default)]
+    pub scale_freedom: Option<f64>,
     /// Range of I of the data: the law is not known outside.
     pub valid_i: [f64; 2],
     /// Mean solid fraction of the points.
@@ -150,7 +157,7 @@ pub(super) fn solve(points: &[(f64, f64, f64)]) -> Result<Solution<3>, FitError>
     })
 }
 
-/// Fits the law to the points of one or more runs.
+/// Fits the law to the points of one or more runs, run after run and each from below.
 ///
 /// Errors in both coordinates: weights 1/(σ_μ² + (∂μ/∂I)² σ_I²) (effective variance, Orear 1982), iterated.
 ///
@@ -164,64 +171,7 @@ pub(super) fn solve(points: &[(f64, f64, f64)]) -> Result<Solution<3>, FitError>
 /// If there are fewer than 4 points, a number is not finite, an error not positive, or the points do not
 /// determine the parameters.
 pub fn fit_mu_i(points: &[LocalPoint], stress: Stress) -> Result<MuIFit, FitError> {
-    if points.len() < 4 {
-        return Err(FitError::TooFewPoints {
-            found: points.len(),
-            needed: 4,
-        });
-    }
-    let friction = |p: &LocalPoint| match stress {
-        Stress::MeanPressure => (p.friction, p.friction_error),
-        Stress::NormalPressure => (p.friction_zz, p.friction_zz_error),
-        // No error of its own: the error of I alone weighs; the measured one keeps the weights finite.
-        Stress::TangentOfSlope => (p.slope_degrees.to_radians().tan(), p.friction_zz_error),
-    };
-    for (index, p) in points.iter().enumerate() {
-        let (mu, error) = friction(p);
-        let checks = [
-            ("I", p.inertial_number, p.inertial_number > 0.0),
-            (
-                "I error",
-                p.inertial_number_error,
-                p.inertial_number_error >= 0.0,
-            ),
-            ("mu", mu, true),
-            ("mu error", error, error > 0.0),
-            ("phi", p.solid_fraction, true),
-        ];
-        for (what, value, allowed) in checks {
-            if !allowed || !value.is_finite() {
-                return Err(FitError::BadPoint { index, what, value });
-            }
-        }
-    }
-    let weighted = |p: Option<&Vector3<f64>>| -> Vec<(f64, f64, f64)> {
-        points
-            .iter()
-            .map(|point| {
-                let (mu, error) = friction(point);
-                let lever = p.map_or(0.0, |p| slope(p, point.inertial_number));
-                let from_i = lever * point.inertial_number_error;
-                (
-                    point.inertial_number,
-                    mu,
-                    1.0 / (error * error + from_i * from_i),
-                )
-            })
-            .collect()
-    };
-    let mut data = weighted(None);
-    let mut fit = solve(&data)?;
-    for _ in 0..20 {
-        data = weighted(Some(&fit.parameters));
-        let next = solve(&data)?;
-        let change = (next.parameters - fit.parameters).amax();
-        fit = next;
-        if change < 1e-9 {
-            break;
-        }
-    }
-
+    let (data, fit) = effective(points, stress)?;
     let p = fit.parameters;
     let normalised: Vec<f64> = data
         .iter()
@@ -242,8 +192,14 @@ pub fn fit_mu_i(points: &[LocalPoint], stress: Stress) -> Result<MuIFit, FitErro
     }
     let freedom = points.len() - 3;
     let mut scale = (fit.chi_square / freedom as f64).max(1.0);
+    let mut scale_freedom = None;
     if runs > 3 {
-        scale = scale.max(between / (runs - 3) as f64);
+        let nu = (runs - 3) as f64;
+        let student = StudentsT::new(0.0, 1.0, nu).map_or(1.0, |t| t.inverse_cdf(ONE_SIGMA));
+        if between / nu > scale {
+            scale = between / nu * student * student;
+            scale_freedom = Some(nu);
+        }
     }
     let covariance = fit.covariance * scale;
     let error = |k: usize| covariance[(k, k)].sqrt();
@@ -273,6 +229,7 @@ pub fn fit_mu_i(points: &[LocalPoint], stress: Stress) -> Result<MuIFit, FitErro
         runs,
         rms_residual: (squares / points.len() as f64).sqrt(),
         error_scale: scale.sqrt(),
+        scale_freedom,
         valid_i: [low, high],
         solid_fraction,
         solid_fraction_error,
@@ -283,21 +240,104 @@ pub fn fit_mu_i(points: &[LocalPoint], stress: Stress) -> Result<MuIFit, FitErro
     })
 }
 
-/// Numbers the runs by their slope, in order of appearance.
-fn run_numbers(points: &[LocalPoint]) -> Vec<usize> {
-    let mut slopes: Vec<f64> = Vec::new();
-    points
-        .iter()
-        .map(|p| {
-            slopes
-                .iter()
-                .position(|s| *s == p.slope_degrees)
-                .unwrap_or_else(|| {
-                    slopes.push(p.slope_degrees);
-                    slopes.len() - 1
-                })
-        })
-        .collect()
+/// Friction of a point and its standard error.
+fn friction(stress: Stress, p: &LocalPoint) -> (f64, f64) {
+    match stress {
+        Stress::MeanPressure => (p.friction, p.friction_error),
+        Stress::NormalPressure => (p.friction_zz, p.friction_zz_error),
+        // No error of its own: the error of I alone weighs; the measured one keeps the weights finite.
+        Stress::TangentOfSlope => (p.slope_degrees.to_radians().tan(), p.friction_zz_error),
+    }
+}
+
+/// Points (I, μ, weight) with effective variances, and the least-squares solution they belong to.
+type Weighted = (Vec<(f64, f64, f64)>, Solution<3>);
+
+fn effective(points: &[LocalPoint], stress: Stress) -> Result<Weighted, FitError> {
+    if points.len() < 4 {
+        return Err(FitError::TooFewPoints {
+            found: points.len(),
+            needed: 4,
+        });
+    }
+    for (index, p) in points.iter().enumerate() {
+        let (mu, error) = friction(stress, p);
+        let checks = [
+            ("I", p.inertial_number, p.inertial_number > 0.0),
+            (
+                "I error",
+                p.inertial_number_error,
+                p.inertial_number_error >= 0.0,
+            ),
+            ("mu", mu, true),
+            ("mu error", error, error > 0.0),
+            ("phi", p.solid_fraction, true),
+        ];
+        for (what, value, allowed) in checks {
+            if !allowed || !value.is_finite() {
+                return Err(FitError::BadPoint { index, what, value });
+            }
+        }
+    }
+    let mut data = weighted(points, stress, &|_| 0.0);
+    let mut fit = solve(&data)?;
+    for _ in 0..20 {
+        data = weighted(points, stress, &|i| slope(&fit.parameters, i));
+        let next = solve(&data)?;
+        let change = (next.parameters - fit.parameters).amax();
+        fit = next;
+        if change < 1e-9 {
+            break;
+        }
+    }
+    Ok((data, fit))
+}
+
+/// (I, μ, weight) with the errors of I at a slope ∂μ/∂I.
+fn weighted(
+    points: &[LocalPoint],
+    stress: Stress,
+    slope: &dyn Fn(f64) -> f64,
+) -> Vec<(f64, f64, f64)> {
+    let of = |point: &LocalPoint| {
+        let (mu, error) = friction(stress, point);
+        let from_i = slope(point.inertial_number) * point.inertial_number_error;
+        let weight = 1.0 / (error * error + from_i * from_i);
+        (point.inertial_number, mu, weight)
+    };
+    points.iter().map(of).collect()
+}
+
+/// The points as other fits take them: (I, μ, weight), with the effective variances of μ(I)'s own fit; where the points
+/// do not determine that one, of a straight line.
+pub(super) fn checked_points(
+    points: &[LocalPoint],
+    stress: Stress,
+) -> Result<Vec<(f64, f64, f64)>, FitError> {
+    match effective(points, stress) {
+        Ok((data, _)) => Ok(data),
+        Err(FitError::Degenerate) => {
+            let line =
+                |p: &SVector<f64, 2>, i: f64| Some((p[0] + p[1] * i, SVector::from([1.0, i])));
+            let plain = weighted(points, stress, &|_| 0.0);
+            let fit = levenberg_marquardt(&plain, SVector::from([0.5, 0.1]), line)?;
+            Ok(weighted(points, stress, &|_| fit.parameters[1]))
+        }
+        Err(error) => Err(error),
+    }
+}
+
+/// Numbers the runs: a run is a stretch of points of one slope, from below.
+pub(super) fn run_numbers(points: &[LocalPoint]) -> Vec<usize> {
+    let mut run = 0;
+    let mut numbers = Vec::with_capacity(points.len());
+    for (k, p) in points.iter().enumerate() {
+        let before = k.checked_sub(1).map(|k| &points[k]);
+        let another = |b: &LocalPoint| b.slope_degrees != p.slope_degrees || b.z > p.z;
+        run += usize::from(before.is_some_and(another));
+        numbers.push(run);
+    }
+    numbers
 }
 
 fn mean_between_runs(points: &[LocalPoint], by_run: &[usize], runs: usize) -> (f64, f64) {

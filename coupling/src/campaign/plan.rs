@@ -1,6 +1,7 @@
 //! Which runs a campaign makes.
 
 use crate::incline::{InclineError, InclineResult, InclineSpec, Purpose, Start};
+use colluvium_dem::{Domain, Grain};
 use serde::{Deserialize, Serialize};
 
 /// Range of slopes to search and how finely.
@@ -39,6 +40,15 @@ impl GuessedLaw {
     }
 }
 
+/// One more settled bed.
+#[derive(Clone, Debug)]
+pub struct OtherBed {
+    /// Its box.
+    pub domain: Domain,
+    /// Its grains over their fixed base.
+    pub grains: Vec<Grain>,
+}
+
 /// A campaign.
 #[derive(Clone, Debug)]
 pub struct CampaignSpec {
@@ -61,6 +71,14 @@ pub struct CampaignSpec {
     /// Largest drift of the mean velocity over the averaging time, relative and its standard error included, of
     /// flows whose points are used: pairs (I, μ) are local and hold in a slow drift, though tan θ does not.
     pub usable_drift: f64,
+    /// Beds of the same grains and depth from other seeds: at every slope of a search all beds are tried.
+    pub other_beds: Vec<OtherBed>,
+    /// How many of all beds, the first included, the flows are measured with; at least 1.
+    pub flow_beds: usize,
+    /// Beds of other depths, for which the stop is sought too: h_stop(θ).
+    pub depths: Vec<OtherBed>,
+    /// Seed of the posterior's samples.
+    pub seed: u64,
 }
 
 /// What can be wrong with a campaign.
@@ -163,7 +181,7 @@ impl CampaignSpec {
             "above guessed_law.mu_s, both positive",
         )?;
         check("guessed_law.i_0", g.i_0, g.i_0 > 0.0, "positive")?;
-        self.flow_run(self.sorted_flow_angles()[0]).validate()?;
+        self.flow_run(self.sorted_flow_angles()[0], 0).validate()?;
         Ok(())
     }
 
@@ -175,18 +193,40 @@ impl CampaignSpec {
         angles
     }
 
-    pub(super) fn flow_run(&self, angle: f64) -> InclineSpec {
+    /// The base on one of the beds: the first, then the others, then those of other depths.
+    fn on_bed(&self, bed: usize) -> InclineSpec {
+        let mut spec = self.base.clone();
+        let others = self.other_beds.iter().chain(&self.depths);
+        if let Some(other) = bed.checked_sub(1).and_then(|k| others.clone().nth(k)) {
+            spec.domain = other.domain;
+            spec.bed = other.grains.clone();
+        }
+        spec
+    }
+
+    /// Numbers of the beds of full depth.
+    pub(super) fn full_beds(&self) -> std::ops::Range<usize> {
+        0..1 + self.other_beds.len()
+    }
+
+    /// Numbers of the beds of other depths.
+    pub(super) fn depth_beds(&self) -> std::ops::Range<usize> {
+        let first = 1 + self.other_beds.len();
+        first..first + self.depths.len()
+    }
+
+    pub(super) fn flow_run(&self, angle: f64, bed: usize) -> InclineSpec {
         let slope = angle.to_radians();
         let inertial_number = self.guessed_law.inertial_number(slope);
         InclineSpec {
             slope,
             start: Start::Flow { inertial_number },
             purpose: Purpose::Measure,
-            ..self.base.clone()
+            ..self.on_bed(bed)
         }
     }
 
-    pub(super) fn stop_run(&self, angle: f64) -> InclineSpec {
+    pub(super) fn stop_run(&self, angle: f64, bed: usize) -> InclineSpec {
         InclineSpec {
             slope: angle.to_radians(),
             start: Start::Flow {
@@ -195,17 +235,17 @@ impl CampaignSpec {
             purpose: Purpose::StopSearch,
             relax_time: 0.5 * self.search_time,
             max_time: self.search_time,
-            ..self.base.clone()
+            ..self.on_bed(bed)
         }
     }
 
-    pub(super) fn onset_run(&self, angle: f64) -> InclineSpec {
+    pub(super) fn onset_run(&self, angle: f64, bed: usize) -> InclineSpec {
         InclineSpec {
             slope: angle.to_radians(),
             start: Start::Rest,
             purpose: Purpose::OnsetSearch,
             max_time: self.search_time,
-            ..self.base.clone()
+            ..self.on_bed(bed)
         }
     }
 
@@ -223,7 +263,11 @@ impl CampaignSpec {
         let steps = |time: f64| time / self.base.timestep;
         let runs = |b: &Bracket| 2.0 + ((b.high - b.low) / b.resolution).log2().ceil().max(0.0);
         let flows = self.flow_angles_degrees.len() as f64 * steps(self.base.max_time);
+        let beds = 1.0 + self.other_beds.len() as f64;
         let searches = (runs(&self.stop) + runs(&self.onset)) * steps(self.search_time);
-        ((flows + searches) * self.base.bed.len() as f64) as u64
+        let full = flows * self.flow_beds as f64 + searches * beds;
+        let shallow: usize = self.depths.iter().map(|bed| bed.grains.len()).sum();
+        let depths = runs(&self.stop) * steps(self.search_time) * shallow as f64;
+        (full * self.base.bed.len() as f64 + depths) as u64
     }
 }

@@ -9,18 +9,20 @@ const TRIES: usize = 3;
 /// Steepest slope that a search moves out to (degrees); at 90° nothing holds the grains to the plane.
 const STEEPEST: f64 = 89.0;
 
-/// Bisection for the slope where beds begin to flow, between a low and a high end that are run first. If an end
+/// Bisection for the slope where most beds begin to flow, between a low and a high end that are run first. If an end
 /// is not what it should be, the search moves outward by the bracket's width, twice at most and not beyond level
-/// ground or 89°. Runs by rising slope; without a resting and a flowing end there is no bisection.
+/// ground or 89°. `run` gives all beds at a slope. Runs by rising slope; without a resting and a flowing end there is
+/// no bisection.
 pub(super) fn search(
     bracket: &Bracket,
-    run: &dyn Fn(f64) -> Result<InclineResult, CampaignError>,
+    run: &dyn Fn(f64) -> Result<Vec<InclineResult>, CampaignError>,
 ) -> Result<Vec<InclineResult>, CampaignError> {
     let mut results = Vec::new();
     let mut flows_at = |angle: f64| -> Result<bool, CampaignError> {
-        let result = run(angle)?;
-        let flows = result.flows();
-        results.push(result);
+        let beds = run(angle)?;
+        let flowing = beds.iter().filter(|r| r.flows()).count();
+        let flows = 2 * flowing > beds.len();
+        results.extend(beds);
         Ok(flows)
     };
     let width = bracket.high - bracket.low;
@@ -96,19 +98,23 @@ impl fmt::Display for NoBracket {
 }
 
 /// Highest slope below the lowest flow that does not flow, and that lowest flow above it. A bed at rest on a
-/// slope steeper than the lowest flow does not hide that flow.
+/// slope steeper than the lowest flow does not hide that flow. Of several beds at a slope most decide.
 pub(super) fn bracket<'a>(
     runs: impl Iterator<Item = &'a InclineResult>,
 ) -> Result<(f64, f64), NoBracket> {
-    let (mut resting, mut flowing) = (Vec::new(), Vec::new());
+    let mut slopes: Vec<(f64, i64)> = Vec::new();
     for run in runs {
-        if run.flows() {
-            &mut flowing
-        } else {
-            &mut resting
+        let vote = if run.flows() { 1 } else { -1 };
+        match slopes.iter_mut().find(|s| s.0 == run.slope_degrees) {
+            Some(known) => known.1 += vote,
+            None => slopes.push((run.slope_degrees, vote)),
         }
-        .push(run.slope_degrees);
     }
+    let those = |flowing: bool| -> Vec<f64> {
+        let most = slopes.iter().filter(|s| (s.1 > 0) == flowing);
+        most.map(|s| s.0).collect()
+    };
+    let (mut resting, flowing) = (those(false), those(true));
     let lowest = |angles: &[f64]| angles.iter().copied().min_by(f64::total_cmp);
     let highest = |angles: &[f64]| angles.iter().copied().max_by(f64::total_cmp);
     let (high, lowest_rest) = match (lowest(&flowing), lowest(&resting)) {
@@ -152,6 +158,10 @@ mod tests {
             cost: Cost::default(),
             largest_overlap: 0.0,
             state_hash: String::new(),
+            bed: 0,
+            grains: 0,
+            sudden_loss: 0.0,
+            bond_order: 0.0,
         }
     }
 
@@ -164,7 +174,7 @@ mod tests {
         };
         let runs = search(&range, &|angle| {
             assert!((0.0..90.0).contains(&angle), "{angle}");
-            Ok(result(angle, angle >= truth))
+            Ok(vec![result(angle, angle >= truth)])
         })
         .unwrap();
         let slopes = runs.iter().map(|r| r.slope_degrees).collect();

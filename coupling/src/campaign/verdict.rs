@@ -1,10 +1,12 @@
 //! Good enough or not, in words with figures.
 
 use super::CampaignSpec;
+use super::causes::{causes, inherited, laws};
 use super::search::NoBracket;
+use super::threshold::{NonLocal, Threshold};
 use crate::calibration::thesis::{Estimator, EstimatorFit, Row, published_row};
-use crate::calibration::{FitError, MuIFit};
-use crate::incline::{InclineResult, Outcome};
+use crate::calibration::{Alternative, FitError, LocalPoint, MuIFit, Posterior, ResidualTests};
+use crate::incline::InclineResult;
 use serde::{Deserialize, Serialize};
 
 /// The judgement on a calibration.
@@ -25,10 +27,16 @@ pub(super) struct Evidence<'a> {
     pub estimators: &'a [EstimatorFit],
     pub stop: &'a Result<(f64, f64), NoBracket>,
     pub onset: &'a Result<(f64, f64), NoBracket>,
+    pub thresholds: [&'a Option<Threshold>; 2],
+    pub non_local: &'a Option<NonLocal>,
+    pub residuals: &'a Option<ResidualTests>,
+    pub alternatives: &'a [Alternative],
+    pub posterior: &'a Option<Posterior>,
+    pub points: &'a [LocalPoint],
 }
 
 /// Root-mean-square residual, relative to μ, above which μ(I) does not describe the material.
-const LARGEST_MISFIT: f64 = 0.03;
+pub(super) const LARGEST_MISFIT: f64 = 0.03;
 /// Largest |σ_zz/weight − 1| of a trustworthy flow.
 const LARGEST_WEIGHT_ERROR: f64 = 0.02;
 /// Overlap over the harmonic mean of the radii above which grains are too soft for the limit of hard grains.
@@ -42,8 +50,13 @@ pub(super) fn judge(e: &Evidence) -> Verdict {
             good = false;
             text.push(format!("No rheology: {error}."));
         }
-        Ok(fit) => judge_fit(fit, &mut good, &mut text),
+        Ok(fit) => {
+            judge_fit(fit, &mut good, &mut text);
+            inherited(fit, e.posterior, &mut text);
+        }
     }
+    laws(e.alternatives, e.points, &mut text);
+    causes(e, &mut good, &mut text);
     if let Ok(fit) = e.fit_zz {
         text.push(format!(
             "Against sigma_zz instead of p: mu_s = {:.3} ± {:.3}, mu_2 = {:.3} ± {:.3}, I_0 = {:.3} ± {:.3}; \
@@ -52,16 +65,29 @@ pub(super) fn judge(e: &Evidence) -> Verdict {
         ));
     }
     judge_runs(e, &mut good, &mut text);
-    for (what, bracket) in [
-        ("Flow stops", e.stop),
-        ("A bed at rest starts to flow", e.onset),
+    for (what, bracket, threshold) in [
+        ("Flow stops", e.stop, e.thresholds[0]),
+        ("A bed at rest starts to flow", e.onset, e.thresholds[1]),
     ] {
-        text.push(match bracket {
-            Ok((low, high)) => format!("{what} between {low:.2}° and {high:.2}°."),
-            Err(why) => {
+        text.push(match (bracket, threshold) {
+            (Ok((low, high)), Some(t)) => format!(
+                "{what} between {low:.2}° and {high:.2}°; half of all beds do at {:.1}° ± {:.1}° ({} runs).",
+                t.degrees,
+                t.error,
+                t.trials.iter().map(|t| t.tried).sum::<u64>()
+            ),
+            (Ok((low, high)), None) => format!("{what} between {low:.2}° and {high:.2}°."),
+            (Err(why), _) => {
                 format!("{what} at a slope outside those tried: no bracket, because {why}.")
             }
         });
+    }
+    if let Some(n) = e.non_local {
+        text.push(format!(
+            "Thin layers stop at steeper slopes: tan theta_stop = {:.3} + (pi A d/2h)^2 with A = {:.2}, to {:.3}; a \
+             non-local rheology would take this length, a local one cannot show it.",
+            n.tangent, n.amplitude, n.rms_residual
+        ));
     }
     let unit = (e.spec.base.diameter / e.spec.base.gravity).sqrt();
     text.push(format!(
@@ -154,11 +180,13 @@ fn judge_runs(e: &Evidence, good: &mut bool, text: &mut Vec<String>) {
     let drifting: Vec<String> = e
         .flows
         .iter()
-        .filter(|r| e.spec.is_usable(r) && r.outcome != Outcome::Steady)
-        .map(|r| {
+        .filter(|r| e.spec.is_usable(r))
+        .filter_map(|r| Some((r, r.unsettled()?)))
+        .map(|(r, why)| {
             format!(
-                "{:.1}° ({:+.0} ± {:.0} %)",
+                "{:.1}° ({}, {:+.0} ± {:.0} %)",
                 r.slope_degrees,
+                why.words(),
                 100.0 * r.steady.drift,
                 100.0 * r.steady.drift_error
             )
@@ -185,6 +213,16 @@ fn judge_runs(e: &Evidence, good: &mut bool, text: &mut Vec<String>) {
         text.push(format!(
             "sigma_zz carries the weight above to {:.2} %.",
             100.0 * weight
+        ));
+    }
+    let lost = used()
+        .filter_map(|r| r.checks)
+        .map(|c| c.mass_outside)
+        .fold(0.0, f64::max);
+    if lost > 0.0 {
+        text.push(format!(
+            "Up to {:.2} % of a flow's mass lies outside the averaging layers: thrown up, or through the base.",
+            100.0 * lost
         ));
     }
     let overlap = used().map(|r| r.largest_overlap).fold(0.0, f64::max);

@@ -132,6 +132,7 @@ impl<K: Kernel> Averager<K> {
             &self.kernel,
             &self.layers,
             snapshot,
+            self.first_time,
             &mut self.blocks[start..start + length],
         );
         self.current_samples += 1;

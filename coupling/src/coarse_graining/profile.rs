@@ -42,7 +42,7 @@ pub struct ProfileRow {
     pub tau: Estimate,
     /// Kinetic part of p (Pa).
     pub kinetic_p: Estimate,
-    /// Granular temperature, trace⟨u′u′⟩/3 [m²/s²], about a velocity profile linear within the layer.
+    /// Granular temperature, trace⟨u′u′⟩/3 [m²/s²], about a velocity linear within the layer and in time.
     pub temperature: Estimate,
     /// What the temperature would gain if velocities were taken about the layer's mean [m²/s²]: (γ̇²/3) var z.
     pub shear_in_layer: Estimate,
@@ -142,12 +142,23 @@ pub(super) fn mean_rows(
             if mass > 0.0 {
                 row[q::U..q::U + 3].copy_from_slice(&velocity);
             }
-            // The mean velocity varies within the layer: V(z) = V + s (ζ − ζ̄), s by least squares.
+            // The mean velocity varies within the layer and in time: V + s (ζ − ζ̄) + c (t − t̄), s and c by least
+            // squares.
             let zeta = per_mass(field::MASS_ZETA);
             let spread = (per_mass(field::MASS_ZETA_2) - zeta * zeta).max(0.0);
             let slope: [f64; 3] = std::array::from_fn(|a| {
                 if spread > 1e-4 * layers.thickness * layers.thickness {
                     (per_mass(field::MOMENTUM_ZETA + a) - velocity[a] * zeta) / spread
+                } else {
+                    0.0
+                }
+            });
+            // A flow that gains speed while it is averaged: what its mean gains is no fluctuation either.
+            let time = per_mass(field::MASS_TIME);
+            let ages = (per_mass(field::MASS_TIME_2) - time * time).max(0.0);
+            let gain: [f64; 3] = std::array::from_fn(|a| {
+                if ages > 1e-9 * time * time {
+                    (per_mass(field::MOMENTUM_TIME + a) - velocity[a] * time) / ages
                 } else {
                     0.0
                 }
@@ -158,7 +169,8 @@ pub(super) fn mean_rows(
                 for j in 0..3 {
                     let fluctuation = per_mass(field::FLUX + PART[i][j])
                         - velocity[i] * velocity[j]
-                        - slope[i] * slope[j] * spread;
+                        - slope[i] * slope[j] * spread
+                        - gain[i] * gain[j] * ages;
                     row[q::STRESS + 3 * i + j] =
                         at(field::CONTACT + 3 * i + j) / volume - row[q::DENSITY] * fluctuation;
                     if i == j {

@@ -28,8 +28,14 @@ pub(super) mod field {
     pub const WALL_ABOVE: usize = 26;
     /// Σ f W over wall contacts [N], 3 parts.
     pub const WALL: usize = 29;
+    /// Σ m t W [kg s], t since the first sample.
+    pub const MASS_TIME: usize = 32;
+    /// Σ m t² W [kg s²].
+    pub const MASS_TIME_2: usize = 33;
+    /// Σ m v t W [kg m], 3 parts.
+    pub const MOMENTUM_TIME: usize = 34;
     /// How many arrays there are.
-    pub const COUNT: usize = 32;
+    pub const COUNT: usize = 37;
     /// After the arrays: mass of all free grains (kg).
     pub const TOTAL_MASS: usize = 0;
     /// After the arrays: mass above the uppermost layer (kg).
@@ -58,9 +64,16 @@ fn spread<K: Kernel>(kernel: &K, layers: &Layering, z: f64, mut put: impl FnMut(
     }
 }
 
-/// Adds one instant to the sums.
-pub(super) fn add<K: Kernel>(kernel: &K, layers: &Layering, snapshot: &Snapshot, sums: &mut [f64]) {
+/// Adds one instant to the sums; `first_time` is that of the first sample (s).
+pub(super) fn add<K: Kernel>(
+    kernel: &K,
+    layers: &Layering,
+    snapshot: &Snapshot,
+    first_time: f64,
+    sums: &mut [f64],
+) {
     let n = layers.count;
+    let time = snapshot.time - first_time;
     for grain in snapshot.grains.iter().filter(|g| !g.fixed) {
         let (z, m, v) = (grain.position.z, grain.mass, grain.velocity);
         spread(kernel, layers, z, |k, share, above| {
@@ -70,7 +83,10 @@ pub(super) fn add<K: Kernel>(kernel: &K, layers: &Layering, snapshot: &Snapshot,
             sums[field::MASS_ZETA * n + k] += ms * zeta;
             sums[field::MASS_ZETA_2 * n + k] += ms * zeta * zeta;
             sums[field::MASS_ABOVE * n + k] += m * above;
+            sums[field::MASS_TIME * n + k] += ms * time;
+            sums[field::MASS_TIME_2 * n + k] += ms * time * time;
             for axis in 0..3 {
+                sums[(field::MOMENTUM_TIME + axis) * n + k] += ms * v[axis] * time;
                 sums[(field::MOMENTUM + axis) * n + k] += ms * v[axis];
                 sums[(field::MOMENTUM_ZETA + axis) * n + k] += ms * v[axis] * zeta;
             }
@@ -101,7 +117,7 @@ pub(super) fn add<K: Kernel>(kernel: &K, layers: &Layering, snapshot: &Snapshot,
         let grain = &snapshot.grains[contact.grain];
         let (other_free, other_z) = match contact.partner {
             Partner::Grain(j) => (!snapshot.grains[j].fixed, snapshot.grains[j].position.z),
-            Partner::Wall(_) => (false, 0.0),
+            Partner::Wall(_) | Partner::Body(_) => (false, 0.0),
         };
         if !grain.fixed {
             add_arm(

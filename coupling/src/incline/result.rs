@@ -103,12 +103,75 @@ pub struct InclineResult {
     pub largest_overlap: f64,
     /// Hash of the last state's bits.
     pub state_hash: String,
+    /// Which of a campaign's beds it was; 0 for the first.
+    #[serde(default)]
+    pub bed: u64,
+    /// Free grains; 0 in results that do not tell.
+    #[serde(default)]
+    pub grains: u64,
+    /// Largest kinetic energy lost within 3 √(d/g), over the largest there was, both after the first 10 √(d/g).
+    #[serde(default)]
+    pub sudden_loss: f64,
+    /// Global bond order Q_6 of the contacts at the end: 0.57 in a face-centred cubic crystal, near 0 in disorder.
+    #[serde(default)]
+    pub bond_order: f64,
+}
+
+/// Why a flow has not settled.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "snake_case")]
+pub enum Unsettled {
+    /// It gains speed: the slope is steeper than any friction of the material, or the run too short.
+    Accelerating,
+    /// It slows down without having stopped.
+    Decelerating,
+    /// It lost most of its energy at once, as grains rearranged.
+    Jamming,
+    /// Its contacts are ordered: it flows, or stopped, as a crystal.
+    Crystallising,
+    /// Too short or noisy to tell.
+    Undecided,
+}
+
+/// Bond order above which grains are a crystal: half of the way to the least ordered one.
+const CRYSTAL: f64 = 0.25;
+/// Loss of energy at once that counts as a jam.
+const JAM: f64 = 0.7;
+
+impl Unsettled {
+    /// In words.
+    pub fn words(self) -> &'static str {
+        match self {
+            Self::Accelerating => "accelerating",
+            Self::Decelerating => "slowing down",
+            Self::Jamming => "jamming",
+            Self::Crystallising => "crystallising",
+            Self::Undecided => "too short to tell",
+        }
+    }
 }
 
 /// Loses more than this share of its mean speed over the second half of a run: it is about to stop.
 const STOPPING_DRIFT: f64 = -0.5;
 
 impl InclineResult {
+    /// What keeps the run from a steady flow; nothing if it is steady, or was at rest from the start.
+    pub fn unsettled(&self) -> Option<Unsettled> {
+        let flowed = matches!(self.start, Start::Flow { .. });
+        if self.bond_order > CRYSTAL {
+            return Some(Unsettled::Crystallising);
+        }
+        match self.outcome {
+            Outcome::Steady => None,
+            Outcome::Rest if flowed && self.sudden_loss > JAM => Some(Unsettled::Jamming),
+            Outcome::Rest => None,
+            Outcome::Accelerating => Some(Unsettled::Accelerating),
+            Outcome::Decelerating if self.sudden_loss > JAM => Some(Unsettled::Jamming),
+            Outcome::Decelerating => Some(Unsettled::Decelerating),
+            Outcome::Undecided => Some(Unsettled::Undecided),
+        }
+    }
+
     /// Does the bed flow at this slope? A run whose time was over counts as a flow unless it was about to stop
     /// (more than half of its mean speed lost over the second half; a drift that is not known does not show
     /// that). Started from rest, it counts as a flow only if it moved on by more than a diameter, and in an

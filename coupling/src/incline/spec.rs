@@ -2,7 +2,7 @@
 
 use crate::coarse_graining::AveragerError;
 use crate::steady_state::ENOUGH_SAMPLES;
-use colluvium_dem::{ContactLaw, Diverged, Domain, Grain, Setup, SetupError, Threads};
+use colluvium_dem::{ContactLaw, Diverged, Domain, Grain, Setup, SetupError, Threads, Wall};
 use nalgebra::Vector3;
 use serde::{Deserialize, Serialize};
 
@@ -211,6 +211,14 @@ impl InclineSpec {
         self.sample_every as f64 * self.timestep
     }
 
+    /// The floor that the base stands on. Without it a fast grain that is pressed through a gap of the base falls for
+    /// ever, and takes ever more energy with it.
+    fn floor(&self, grains: &[Grain]) -> Option<Wall> {
+        let fixed = grains.iter().filter(|g| g.fixed);
+        let lowest = fixed.map(|g| g.position.z - g.radius).reduce(f64::min)?;
+        Some(Wall::plane(Vector3::z() * lowest, Vector3::z()))
+    }
+
     pub(super) fn setup(&self) -> Setup {
         let mut grains = self.bed.clone();
         let stretch = self.starting_stretch();
@@ -221,8 +229,9 @@ impl InclineSpec {
             domain: self.domain,
             gravity: self.gravity * Vector3::new(self.slope.sin(), 0.0, -self.slope.cos()),
             law: self.law.into(),
+            walls: self.floor(&grains).into_iter().collect(),
             grains,
-            walls: Vec::new(),
+            bodies: Vec::new(),
             timestep: self.timestep,
             threads: self.threads,
         }

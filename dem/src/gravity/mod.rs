@@ -15,6 +15,7 @@ use crate::grains::{Grains, vector};
 use crate::record::Record;
 use crate::setup::{SetupError, check};
 use crate::simulation::Simulation;
+use nalgebra::Vector3;
 use tree::Tree;
 
 /// Newton's constant of gravitation (m³/(kg s²)), CODATA 2018.
@@ -100,6 +101,12 @@ impl Gravity {
         }
     }
 
+    /// Acceleration (m/s²) and potential (m²/s²) of the heavy sphere at a point.
+    pub fn at(&self, x: &Vector3<f64>) -> (Vector3<f64>, f64) {
+        let sphere = self.sphere.as_ref();
+        sphere.map_or((Vector3::zeros(), 0.0), |sphere| sphere.field(x))
+    }
+
     /// Potential energy of all grains in the fields (J).
     pub fn potential(&self) -> f64 {
         self.pulls.iter().map(|pull| pull[3]).sum()
@@ -167,6 +174,14 @@ impl Simulation {
         if let Some(own) = &own {
             own.validate()?;
             self.check_open("gravity.opening")?;
+            let bodies = self.body_count() as f64;
+            let word = "0: bodies do not attract";
+            check(
+                "gravity.opening in a scene with bodies",
+                bodies,
+                word,
+                |n| n == 0.0,
+            )?;
         }
         self.forget_observation();
         self.fields.own = own;

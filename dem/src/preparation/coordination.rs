@@ -114,6 +114,8 @@ mod tests {
             force: zero,
             arm: zero,
             partner_arm: zero,
+            torque: zero,
+            partner_torque: zero,
         };
         Snapshot {
             grains: fixed.iter().enumerate().map(grain).collect(),

@@ -101,6 +101,7 @@ pub fn settle_incline_bed(
         law: spec.law.into(),
         grains: cloud,
         walls: vec![floor],
+        bodies: Vec::new(),
         timestep: spec.timestep,
         threads,
     })?;

@@ -257,6 +257,7 @@ fn simulation(packing: &Packing) -> Result<Simulation, SetupError> {
         law: law.into(),
         grains: packing.grains.clone(),
         walls: Vec::new(),
+        bodies: Vec::new(),
         timestep: 0.1 * (smallest / STIFFNESS).sqrt(),
         threads: Threads::Serial,
     })

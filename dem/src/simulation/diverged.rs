@@ -23,9 +23,24 @@ pub enum Diverged {
         /// A step that would do.
         remedy: Remedy,
     },
-    /// Grains have run through each other.
+    /// A body's position is no longer a number.
     #[error(
-        "grains overlapped by {overlap:.2} of their radius before t = {time:e} s: the time step of \
+        "body {body} has left the range of numbers at t = {time:e} s: the time step of \
+         {timestep:e} s is too long for the stiffness and speeds of this scene; {remedy}"
+    )]
+    Lost {
+        /// Number of the body.
+        body: usize,
+        /// When it was found (s).
+        time: f64,
+        /// The step (s).
+        timestep: f64,
+        /// A step that would do.
+        remedy: Remedy,
+    },
+    /// Grains or bodies have run through each other.
+    #[error(
+        "grains or bodies overlapped by {overlap:.2} of their radius before t = {time:e} s: the time step of \
          {timestep:e} s is too long, or the grains are too soft for their speeds; {remedy}"
     )]
     Overlap {
@@ -95,6 +110,16 @@ impl Simulation {
                 remedy: self.remedy(false),
             });
         }
+        let mut bodies = self.bodies.rigid.iter();
+        let lost = |x: &f64| !(x.abs() < 1e150);
+        if let Some(body) = bodies.position(|body| body.state().iter().any(lost)) {
+            return Err(Diverged::Lost {
+                body,
+                time,
+                timestep,
+                remedy: self.remedy(false),
+            });
+        }
         let n = self.grains.len();
         let lost = |x: &[f64; 4]| !x.iter().all(|c| c.abs() < FARTHEST);
         match self.grains.place[..n].iter().position(lost) {
@@ -116,8 +141,9 @@ impl Simulation {
             mass: self.grains.mass[i],
             fixed: self.grains.is_fixed(i),
         });
-        let walls: Vec<u16> = self.walls.iter().map(|w| w.wall.material).collect();
-        Classes::of(bodies, &walls)
+        let walls = self.walls.iter().filter(|w| w.carrier.is_none());
+        let walls: Vec<u16> = walls.map(|w| w.wall.material).collect();
+        Classes::of(bodies.chain(self.bodies.classes(&self.walls)), &walls)
     }
 
     /// A step that would do for these grains: that of contacts under a large overlap, and in a `leap`

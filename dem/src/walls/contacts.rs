@@ -244,7 +244,7 @@ impl WallContacts {
         domain: &Domain,
         skin: f64,
     ) -> f64 {
-        let (from, reach) = (self.near.len(), x[3] + skin);
+        let (from, reach) = (self.near.len(), x[3] + wall.rounding + skin);
         let near = &mut self.near;
         let far = wall.images_near(mesh, &vector(x), reach, domain, |shift, centre| {
             mesh.near(centre, reach, |triangle| {
@@ -252,7 +252,7 @@ impl WallContacts {
             });
         });
         if near.len() == from {
-            return skin.max(far - x[3]);
+            return skin.max(far - x[3] - wall.rounding);
         }
         // The order that the tree finds them in must not matter.
         near[from..].sort_unstable_by(|a, b| {
@@ -352,22 +352,23 @@ fn meet_mesh<I: Interaction>(
     let held = if I::HOLDS && known > 0 {
         law.hold(
             wall.coefficients(law, scene.grains, grain),
-            scene.grains.turn[grain][3],
+            scene.grains.turn[grain][3] + wall.curvature(),
         )
     } else {
         0.0
     };
+    let radius = x[3] + wall.rounding;
     let seen = |near: &Near| vector(x) + near.shift - wall.pose.position;
     let mut offers = Offers::none();
     if let Shape::Mesh(mesh) = &wall.wall.shape {
         for (near, number) in near.iter().zip(0..) {
             let centre = wall.pose.inward(&seen(near));
-            if let Some(foot) = mesh.offer(near.triangle, &centre, x[3] + held) {
+            if let Some(foot) = mesh.offer(near.triangle, &centre, radius + held) {
                 offers.take(foot, number);
             }
         }
     }
-    let contacts = offers.contacts(x[3]);
+    let contacts = offers.contacts(radius);
     let mut deepest: f64 = 0.0;
     for (row, (foot, number)) in rows.iter_mut().zip(contacts.feet()) {
         let seen = vector(x) + near[*number as usize].shift - wall.pose.position;
@@ -378,7 +379,10 @@ fn meet_mesh<I: Interaction>(
         let meeting = Meeting {
             grain,
             seen,
-            foot: Foot { normal, ..*foot },
+            foot: Foot {
+                distance: foot.distance - wall.rounding,
+                normal,
+            },
         };
         deepest = deepest.max(row.evaluate(law, wall, &meeting, scene));
     }
@@ -408,7 +412,7 @@ fn start_travel(wall: &mut Standing, grains: &Grains, domain: &Domain, skin: f64
     let far = places.map(|x| wall.seen(&vector(x), domain).norm() + x[3]);
     // A grain that comes from afar comes along with the room it had: twice is enough.
     let met = 2.0 * far.fold(0.0, f64::max) + skin;
-    wall.extent = wall.wall.shape.extent().min(met);
+    wall.extent = (wall.wall.shape.extent() + wall.rounding).min(met);
 }
 
 impl WallContact {
@@ -426,12 +430,14 @@ impl WallContact {
         let (x, v, s) = (&grains.place[g], &grains.motion[g], &grains.turn[g]);
         let coefficients = wall.coefficients(law, grains, g);
         let overlap = x[3] - foot.distance;
+        let curvature = s[3] + wall.curvature();
         let held = if I::HOLDS && self.history[I::HISTORY - 1] != 0.0 {
-            law.hold(coefficients, s[3])
+            law.hold(coefficients, curvature)
         } else {
             0.0
         };
-        if overlap <= -held || v[3] == 0.0 {
+        // What is held still and a wall have nothing to say to each other.
+        if overlap <= -held || v[3] == 0.0 && !wall.yields() {
             if self.touching {
                 self.part();
             }
@@ -449,8 +455,10 @@ impl WallContact {
         let turn = Vec3([s[0], s[1], s[2]]).scale(share);
         let mut velocity = Vec3([v[0], v[1], v[2]]) - turn.cross(normal);
         let mut spin = Vec3([s[0], s[1], s[2]]).scale(s[3]);
+        let mut inverse_mass = v[3];
         if wall.moves() {
             let arm = meeting.seen - foot.normal * foot.distance;
+            inverse_mass += wall.inverse_mass_at(&arm, &foot.normal);
             velocity = velocity - Vec3(wall.velocity_at(&arm).into());
             spin = spin - Vec3(wall.spin.into());
         }
@@ -459,8 +467,8 @@ impl WallContact {
             overlap,
             velocity,
             spin,
-            inverse_mass: v[3],
-            curvature: s[3],
+            inverse_mass,
+            curvature,
             inverse_inertia: v[3] * s[3] * s[3],
         };
         let wrench = law.wrench(coefficients, &touch, &mut self.history, scene.step);

@@ -1,4 +1,4 @@
-//! What grains do to a wall.
+//! What grains and bodies do to a wall.
 
 use super::{Pose, Wall};
 use crate::simulation::Simulation;
@@ -51,7 +51,8 @@ impl WallImpulse {
 impl Simulation {
     /// Number of walls.
     pub fn wall_count(&self) -> usize {
-        self.walls.len()
+        let standing = self.walls.iter().filter(|wall| wall.carrier.is_none());
+        standing.count()
     }
 
     /// A wall as it was set up.
@@ -69,7 +70,7 @@ impl Simulation {
         [self.walls[wall].velocity, self.walls[wall].spin]
     }
 
-    /// Force and torque of the grains on a wall at this instant.
+    /// Force and torque of grains and bodies on a wall at this instant.
     pub fn wall_load(&mut self, wall: usize) -> WallLoad {
         self.observe();
         self.walls[wall].load

@@ -11,6 +11,7 @@
 //! Along periodic axes a bounded wall is met in its nearest image.
 
 mod contacts;
+mod cuboid;
 mod cylinder;
 mod disk;
 mod frustum;
@@ -27,10 +28,12 @@ mod sphere_shell;
 mod standing;
 
 pub(crate) use contacts::{Age, Scene, WallContact, WallContacts};
+pub use cuboid::Cuboid;
 pub use cylinder::Cylinder;
 pub use disk::Disk;
 pub use frustum::{Ends, Frustum};
 pub use load::{WallImpulse, WallLoad};
+pub(crate) use meridian::any_normal_to;
 pub use mesh::{Mesh, MeshError, MeshReport};
 pub use motion::{Motion, Rotation, Sine, Staircase, Table};
 pub use plane::Plane;
@@ -38,9 +41,10 @@ pub use pose::Pose;
 pub use rectangle::Rectangle;
 pub(crate) use servo::Course;
 pub use servo::{Servo, Target};
+pub(crate) use shape::unit;
 pub use shape::{Foot, Shape, Side};
 pub use sphere_shell::SphereShell;
-pub(crate) use standing::{Span, Standing};
+pub(crate) use standing::{Carrier, Span, Standing};
 
 use crate::setup::{SetupError, check};
 use nalgebra::Vector3;
@@ -113,6 +117,11 @@ impl Wall {
             Shape::SphereShell(SphereShell { radius, side }),
             Pose::at(centre),
         )
+    }
+
+    /// A solid cuboid about its centre, with edges along the axes; half their lengths (m).
+    pub fn cuboid(centre: Vector3<f64>, half_sides: Vector3<f64>) -> Wall {
+        Wall::new(Shape::Cuboid(Cuboid { half_sides }), Pose::at(centre))
     }
 
     /// A frustum whose first end lies at a point (m).

@@ -3,6 +3,7 @@
 //! A shape answers one question: where is its surface nearest to a centre? Walls are shapes that stand
 //! or move as they are told; a rigid body may be made of the same shapes.
 
+use super::cuboid::Cuboid;
 use super::cylinder::Cylinder;
 use super::disk::Disk;
 use super::frustum::{Ends, Frustum};
@@ -47,6 +48,8 @@ pub enum Shape {
     Cylinder(Cylinder),
     /// A cone or its stump, open or solid.
     Frustum(Frustum),
+    /// A solid cuboid.
+    Cuboid(Cuboid),
     /// A sphere.
     SphereShell(SphereShell),
     /// A triangle mesh; a sphere may touch it in several points.
@@ -63,6 +66,7 @@ impl Shape {
             Shape::Rectangle(shape) => shape.foot(centre),
             Shape::Cylinder(shape) => shape.foot(centre),
             Shape::Frustum(shape) => shape.foot(centre),
+            Shape::Cuboid(shape) => shape.foot(centre),
             Shape::SphereShell(shape) => shape.foot(centre),
             Shape::Mesh(mesh) => mesh.foot(centre),
         }
@@ -76,6 +80,7 @@ impl Shape {
             Shape::Rectangle(r) => (r.half_sides[0] + r.half_sides[1]).norm(),
             Shape::Cylinder(c) => c.radius.hypot(c.half_length),
             Shape::Frustum(f) => f.radii[0].max(f.radii[1].hypot(f.height)),
+            Shape::Cuboid(cuboid) => cuboid.half_sides.norm(),
             Shape::SphereShell(shell) => shell.radius,
             Shape::Mesh(mesh) => mesh.extent(),
         }
@@ -85,7 +90,7 @@ impl Shape {
     /// by its distance.
     pub(crate) fn is_plate(&self) -> bool {
         match self {
-            Shape::Plane(_) => false,
+            Shape::Plane(_) | Shape::Cuboid(_) => false,
             Shape::Disk(_) | Shape::Rectangle(_) | Shape::Mesh(_) => true,
             Shape::Cylinder(Cylinder { side, .. }) => *side == Side::Both,
             Shape::Frustum(frustum) => frustum.ends == Ends::Open(Side::Both),
@@ -128,6 +133,11 @@ impl Shape {
                     check(&key, radius, "≥ 0 m", |v| v >= 0.0)?;
                 }
                 length("radii, the larger", frustum.radii[0].max(frustum.radii[1]))
+            }
+            Shape::Cuboid(cuboid) => {
+                let sides = cuboid.half_sides.iter().enumerate();
+                let mut sides = sides.map(|(k, side)| length(&format!("half_sides[{k}]"), *side));
+                sides.try_for_each(|side| side)
             }
             Shape::SphereShell(shell) => length("radius", shell.radius),
             // Checked when it was made.

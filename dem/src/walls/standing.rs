@@ -1,4 +1,4 @@
-//! A wall during a run: where it is, how it moves, what it carries.
+//! A wall, or a part of a rigid body, during a run: where it is, how it moves, what it carries.
 
 use super::load::{WallImpulse, WallLoad};
 use super::mesh::Mesh;
@@ -10,7 +10,7 @@ use super::{Foot, Wall};
 use crate::contact::{COEFFICIENTS, Interaction};
 use crate::domain::Domain;
 use crate::grains::Grains;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 
 /// A wall and its state.
 #[derive(Clone, Debug)]
@@ -28,7 +28,39 @@ pub(crate) struct Standing {
     pub travel: f64,
     /// Distance of the farthest such point from its origin, at least (m).
     pub extent: f64,
+    /// How far the surface lies beyond the shape: parts of bodies have rounded edges (m).
+    pub rounding: f64,
+    /// The body that it is a part of, if it is.
+    pub carrier: Option<Carrier>,
     upright: bool,
+}
+
+/// What a part knows of its body.
+#[derive(Clone, Copy, Debug, Default)]
+pub(crate) struct Carrier {
+    /// Number of the body.
+    pub body: u32,
+    /// From the point that the body turns about to the part's origin (m).
+    pub offset: Vector3<f64>,
+    /// 1/M (1/kg), 0 for a body that moves as it is told.
+    pub inverse_mass: f64,
+    /// Inverse of the inertia tensor in directions of space (1/(kg m²)).
+    pub inverse_inertia: Matrix3<f64>,
+    /// 1/R of a sphere (1/m), 0 for other parts.
+    pub curvature: f64,
+}
+
+impl Carrier {
+    /// 1/m that a push along a unit normal feels at an arm from the turning point (1/kg).
+    pub fn inverse_mass_at(&self, arm: &Vector3<f64>, normal: &Vector3<f64>) -> f64 {
+        let lever = arm.cross(normal);
+        self.inverse_mass + lever.dot(&(self.inverse_inertia * lever))
+    }
+
+    /// Whether forces move it.
+    pub fn yields(&self) -> bool {
+        self.inverse_mass > 0.0 || self.inverse_inertia != Matrix3::zeros()
+    }
 }
 
 /// A step in time; times are the same bits whenever they are asked for.
@@ -75,6 +107,8 @@ impl Standing {
             impulse: WallImpulse::default(),
             travel: 0.0,
             extent: f64::INFINITY,
+            rounding: 0.0,
+            carrier: None,
         };
         if let Motion::Servo(servo) = &standing.wall.motion {
             standing.velocity = servo.axis * course.speed;
@@ -82,9 +116,30 @@ impl Standing {
         standing
     }
 
+    /// Whether forces move it: it is part of a body that yields.
+    #[inline(always)]
+    pub fn yields(&self) -> bool {
+        self.carrier.as_ref().is_some_and(Carrier::yields)
+    }
+
+    /// 1/m that a push along a unit normal feels at an arm from the origin (1/kg); 0 for walls.
+    #[inline(always)]
+    pub fn inverse_mass_at(&self, arm: &Vector3<f64>, normal: &Vector3<f64>) -> f64 {
+        match &self.carrier {
+            None => 0.0,
+            Some(carrier) => carrier.inverse_mass_at(&(carrier.offset + arm), normal),
+        }
+    }
+
+    /// 1/R that enters a contact law (1/m): of spheres of bodies; walls have none.
+    #[inline(always)]
+    pub fn curvature(&self) -> f64 {
+        self.carrier.map_or(0.0, |carrier| carrier.curvature)
+    }
+
     #[inline(always)]
     pub fn moves(&self) -> bool {
-        !matches!(self.wall.motion, Motion::Fixed)
+        self.carrier.is_some() || !matches!(self.wall.motion, Motion::Fixed)
     }
 
     /// A step under the present load.
@@ -104,9 +159,31 @@ impl Standing {
         }
     }
 
+    /// A part of a body, whose surface lies beyond its shape by a rounding (m).
+    pub fn part(wall: Wall, rounding: f64, carrier: Carrier) -> Standing {
+        let start = Span::ending(0, 0.0);
+        Standing {
+            rounding,
+            carrier: Some(carrier),
+            ..Standing::at(wall, start, Course::default())
+        }
+    }
+
+    /// Goes where its body takes it.
+    pub fn carry(&mut self, pose: Pose, velocity: Vector3<f64>, spin: Vector3<f64>) {
+        let turn = pose.orientation * self.pose.orientation.inverse();
+        self.travel += (pose.position - self.pose.position).norm();
+        let turned = 2.0 * turn.imag().norm();
+        if turned > 0.0 {
+            self.travel += turned * self.extent;
+        }
+        (self.pose, self.velocity, self.spin) = (pose, velocity, spin);
+        self.upright = pose.is_upright();
+    }
+
     /// Makes a step.
     pub fn advance(&mut self, step: Span) {
-        if !self.moves() {
+        if matches!(self.wall.motion, Motion::Fixed) {
             return;
         }
         let next = self.stride(step);
@@ -136,11 +213,15 @@ impl Standing {
     #[inline(always)]
     pub fn foot(&self, seen: &Vector3<f64>) -> Foot {
         if self.upright {
-            return self.wall.shape.foot(seen);
+            let foot = self.wall.shape.foot(seen);
+            return Foot {
+                distance: foot.distance - self.rounding,
+                ..foot
+            };
         }
         let foot = self.wall.shape.foot(&self.pose.inward(seen));
         Foot {
-            distance: foot.distance,
+            distance: foot.distance - self.rounding,
             normal: self.pose.outward(&foot.normal),
         }
     }

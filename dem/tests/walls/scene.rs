@@ -49,6 +49,7 @@ pub fn setup(law: ContactLaw, grains: Vec<Grain>, walls: Vec<Wall>, timestep: f6
         law: law.into(),
         grains,
         walls,
+        bodies: Vec::new(),
         timestep,
         threads: Threads::Serial,
     }

@@ -110,6 +110,7 @@ pub fn setup(law: ContactLaw, grains: usize, timestep: f64) -> Setup {
         law: law.into(),
         grains,
         walls: vec![Wall::plane(Vector3::zeros(), Vector3::z())],
+        bodies: Vec::new(),
         timestep,
         threads: Threads::Serial,
     }

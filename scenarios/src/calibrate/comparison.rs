@@ -9,7 +9,7 @@ use crate::scene::{InclineScene, Scene, SceneBody};
 use colluvium_continuum::bagnold::BagnoldCase;
 use colluvium_continuum::layer::Options;
 use colluvium_continuum::rheology::MuI;
-use colluvium_coupling::calibration::MuIFit;
+use colluvium_coupling::calibration::{MuIFit, Posterior};
 use colluvium_coupling::campaign::CampaignResult;
 use colluvium_coupling::incline::{InclineResult, Purpose};
 use std::ops::ControlFlow;
@@ -27,8 +27,18 @@ pub(super) fn compare(
     let mut remarks = Vec::new();
     let options = solver()?;
     let fits = [
-        (FrictionOf::Pressure, "|τ|/p", &result.fit),
-        (FrictionOf::NormalStress, "|τ|/σ_zz", &result.fit_zz),
+        (
+            FrictionOf::Pressure,
+            "|τ|/p",
+            &result.fit,
+            &result.posterior,
+        ),
+        (
+            FrictionOf::NormalStress,
+            "|τ|/σ_zz",
+            &result.fit_zz,
+            &result.posterior_zz,
+        ),
     ];
     for angle in &body.calibration.compare_degrees {
         let run = result.runs.iter().find(|r| {
@@ -42,10 +52,13 @@ pub(super) fn compare(
             ));
             continue;
         };
-        for (friction, name, fit) in fits {
+        for (friction, name, fit, posterior) in fits {
             let Some(fit) = fit else { continue };
             match one(body, &options, fit, friction, run) {
-                Ok(comparison) => comparisons.push(comparison),
+                Ok(mut comparison) => {
+                    comparison.band = band(posterior.as_ref(), &comparison);
+                    comparisons.push(comparison);
+                }
                 Err(colluvium_continuum::Error::Stopped { .. }) => {
                     return Err(super::stopped(directory));
                 }
@@ -67,6 +80,25 @@ fn solver() -> Result<Options, Failure> {
         SceneBody::Bagnold(layer) => Ok(bagnold::options(&layer)),
         _ => Ok(Options::default()),
     }
+}
+
+/// Quantiles of the velocity over that of the best law, from the posterior: in a uniform flow u ∝ I where μ(I) is the
+/// slope's tangent. Samples that rest there, or have no steady flow, count as the ends.
+fn band(posterior: Option<&Posterior>, comparison: &Comparison) -> Option<[f64; 5]> {
+    let tangent = comparison.slope_degrees.to_radians().tan();
+    let best = comparison.inertial_number;
+    if !(best > 0.0 && best.is_finite()) {
+        return None;
+    }
+    posterior?.band(|[mu_s, mu_2, i_0]| {
+        if tangent <= mu_s {
+            0.0
+        } else if tangent >= mu_2 {
+            f64::MAX
+        } else {
+            i_0 * (tangent - mu_s) / (mu_2 - tangent) / best
+        }
+    })
 }
 
 /// The continuum layer that stands beside a flow of grains.
@@ -114,5 +146,18 @@ fn one(
         u: solution.u,
         p: solution.p,
         exact_u: solution.exact_u,
+        band: None,
+        grains_u: grains_beside(run),
     })
+}
+
+/// Mean velocity over the flow's height, of grains above the base (m/s).
+fn grains_beside(run: &InclineResult) -> Option<f64> {
+    let rows = &run.profile.as_ref()?.rows;
+    let inside: Vec<f64> = rows
+        .iter()
+        .filter(|r| r.z > 0.0 && r.z < run.height)
+        .map(|r| r.u.value)
+        .collect();
+    (!inside.is_empty()).then(|| inside.iter().sum::<f64>() / inside.len() as f64)
 }

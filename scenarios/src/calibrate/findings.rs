@@ -8,6 +8,7 @@ use crate::state_hash;
 use crate::summary::{Quantity, Summary};
 use crate::table::Table;
 use colluvium_coupling::calibration::thesis::{Estimator, published_row};
+use colluvium_coupling::campaign::Threshold;
 use colluvium_coupling::incline::{InclineResult, Outcome, Purpose, Start};
 
 /// The summary of a campaign, without model, cost and status.
@@ -94,6 +95,50 @@ pub(super) fn summarise(scene: &Scene, record: &Campaign) -> Summary {
             );
         }
     }
+    for (name, threshold, source) in [
+        ("stop", &result.stop, "half of the beds stop"),
+        ("onset", &result.onset, "half of the beds set off"),
+    ] {
+        if let Some(t) = threshold {
+            let value = Quantity::new(t.degrees, "degree").with_error(t.error);
+            summary.put(name, value.from(source));
+        }
+    }
+    if let Some(n) = &result.non_local {
+        let source = "h_stop(θ): tan θ = tan θ_1 + (π A d/2h)²";
+        summary.put(
+            "non_local_amplitude",
+            Quantity::new(n.amplitude, "1").from(source),
+        );
+    }
+    if let Some((ratio, spread)) = result.pressure_ratio {
+        let value = Quantity::new(ratio, "1").with_error(spread);
+        summary.put(
+            "pressure_ratio",
+            value.from("p/σ_zz, mean and deviation of the points"),
+        );
+    }
+    for a in &result.alternatives {
+        let name = format!("weight_{}", format!("{:?}", a.law).to_lowercase());
+        summary.put(
+            &name,
+            Quantity::new(a.weight, "1").from("Akaike weight of the law"),
+        );
+    }
+    for c in &record.comparisons {
+        if let Some((difference, [_, within])) = c.against_grains() {
+            let fit = match c.friction {
+                FrictionOf::Pressure => "p",
+                FrictionOf::NormalStress => "zz",
+            };
+            let name = format!("velocity_against_grains_{}_{fit}", c.slope_degrees);
+            let words = if within { "inside" } else { "outside" };
+            let source = format!(
+                "continuum over grains less 1; the grains lie {words} 95 % of the posterior"
+            );
+            summary.put(&name, Quantity::new(difference, "1").against(0.0, &source));
+        }
+    }
     if let Some(fit) = &result.fit {
         summary.put(
             "identified",
@@ -141,6 +186,9 @@ pub(super) fn tables(record: &Campaign) -> Vec<Table> {
             "1",
             column(&|r| flag(r.outcome == Outcome::Steady)),
         )
+        .with("bed", "1", column(&|r| r.bed as f64))
+        .with("sudden_loss", "1", column(&|r| r.sudden_loss))
+        .with("bond_order", "1", column(&|r| r.bond_order))
         .with("mean_velocity", "m/s", column(&|r| r.steady.mean))
         .with(
             "mean_velocity_error",
@@ -172,9 +220,38 @@ pub(super) fn tables(record: &Campaign) -> Vec<Table> {
             .with("p", "Pa", of(&|c, k| c.p[k]))
             .with("u_exact", "m/s", of(&|c, k| c.exact_u[k])),
     );
+    let result = &record.result;
+    if let Some(posterior) = &result.posterior {
+        let part = |k: usize| posterior.samples.iter().map(|s| s[k]).collect();
+        tables.push(
+            Table::new(super::POSTERIOR)
+                .with("mu_s", "1", part(0))
+                .with("mu_2", "1", part(1))
+                .with("i_0", "1", part(2)),
+        );
+    }
+    if let Some(table) = &result.free_form {
+        tables.push(
+            Table::new("free_form")
+                .with("i", "1", table.inertial_number.clone())
+                .with("mu", "1", table.friction.clone()),
+        );
+    }
+    if !result.stop_curve.is_empty() {
+        let of = |f: &dyn Fn(&Threshold) -> f64| result.stop_curve.iter().map(f).collect();
+        tables.push(
+            Table::new("stop_curve")
+                .with("height", "m", of(&|t| t.height))
+                .with("slope_degrees", "degree", of(&|t| t.degrees))
+                .with("slope_degrees_error", "degree", of(&|t| t.error)),
+        );
+    }
     for run in runs.iter().filter(|r| r.purpose == Purpose::Measure) {
         if let Some(profile) = &run.profile {
-            let name = format!("profile_{}", run.slope_degrees);
+            let name = match run.bed {
+                0 => format!("profile_{}", run.slope_degrees),
+                bed => format!("profile_{}_bed_{}", run.slope_degrees, bed + 1),
+            };
             tables.push(incline::profile_table(&name, profile));
         }
     }

@@ -1,9 +1,12 @@
 //! What runs are compared by, scene by scene.
 
+use crate::calibrate::RHEOLOGY;
 use crate::failure::Failure;
 use crate::report;
+use crate::rheology_file::RheologyFile;
 use crate::scene::{Scene, SceneBody};
 use crate::table::Table;
+use colluvium_coupling::calibration::mu_of_i;
 use std::path::Path;
 
 /// Relative errors by the observables' names.
@@ -34,10 +37,44 @@ pub fn errors(scene: &Scene, run: &Path, reference: &Path) -> Result<Errors, Fai
             "restitution".to_owned(),
             result(run, reference, "restitution")?,
         )],
+        SceneBody::Collapse(_) => vec![
+            ("deposit".to_owned(), curve(run, reference, DEPOSIT)),
+            ("front".to_owned(), result(run, reference, "x_front")?),
+        ],
         SceneBody::Incline(_) | SceneBody::Bagnold(_) => {
             vec![("velocity".to_owned(), curve(run, reference, PROFILE))]
         }
     })
+}
+
+/// Relative errors of a campaign against another: of the fitted friction, largest over the inertial numbers that both
+/// measured, and of the slopes where flow stops and sets off. NaN where one has none.
+pub fn of_campaigns(run: &Path, reference: &Path) -> Result<Errors, Failure> {
+    let laws = [run, reference].map(|path| RheologyFile::read(&path.join(RHEOLOGY)).ok());
+    let friction = match &laws {
+        [Some(ours), Some(theirs)] => friction_error(ours, theirs),
+        _ => f64::NAN,
+    };
+    Ok(vec![
+        ("friction".to_owned(), friction),
+        ("stop".to_owned(), result(run, reference, "stop")?),
+        ("onset".to_owned(), result(run, reference, "onset")?),
+    ])
+}
+
+fn friction_error(ours: &RheologyFile, theirs: &RheologyFile) -> f64 {
+    let (Some(a), Some(b)) = (ours.valid_i, theirs.valid_i) else {
+        return f64::NAN;
+    };
+    let (low, high) = (a[0].max(b[0]), a[1].min(b[1]));
+    if low <= 0.0 || low >= high {
+        return f64::NAN;
+    }
+    let friction = |law: &RheologyFile, i: f64| mu_of_i(law.mu_s, law.mu_2, law.i_0, i);
+    (0..=32)
+        .map(|k| low * (high / low).powf(f64::from(k) / 32.0))
+        .map(|i| (friction(ours, i) / friction(theirs, i) - 1.0).abs())
+        .fold(0.0, f64::max)
 }
 
 /// What the error is, in words.
@@ -50,6 +87,9 @@ pub fn against_reference(scene: &Scene) -> String {
         SceneBody::Chute(_) | SceneBody::Settle(_) => {
             "the reference run; largest relative error of kinetic energy (L2 over the time of the run), height of the centre of mass, solid fraction and coordination at the end".to_owned()
         }
+        SceneBody::Collapse(_) => {
+            "the reference run; the larger of the relative L2 error of the deposit's height and the relative error of the front".to_owned()
+        }
         _ => "the reference run".to_owned(),
     }
 }
@@ -58,6 +98,7 @@ pub fn against_reference(scene: &Scene) -> String {
 type Curve = [&'static str; 3];
 
 const ENERGY: Curve = ["energy.csv", "t", "kinetic_energy"];
+const DEPOSIT: Curve = ["deposit.csv", "x", "h"];
 const PROFILE: Curve = ["profile.csv", "z", "u"];
 
 /// Relative L2 difference of a curve, at the run's own points; NaN where one has none.
@@ -102,6 +143,24 @@ fn interpolate(points: &[(f64, f64)], x: f64) -> Option<f64> {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn laws_are_compared_where_both_were_measured() {
+        let law = |mu_s: f64, low: f64, high: f64| -> RheologyFile {
+            let text = format!(
+                "mu_s = {mu_s}\nmu_2 = 0.9\ni_0 = 0.3\ndiameter = 0.01\nsolid_fraction = 0.5\nvalid_i = [{low}, {high}]\n"
+            );
+            toml::from_str(&text).unwrap()
+        };
+        assert_eq!(
+            friction_error(&law(0.4, 0.1, 0.5), &law(0.4, 0.2, 0.9)),
+            0.0
+        );
+        // Furthest apart at the lowest common I, 0.2: 0.624 against 0.6.
+        let error = friction_error(&law(0.44, 0.1, 0.5), &law(0.4, 0.2, 0.9));
+        assert!((error - 0.04).abs() < 1e-12, "{error}");
+        assert!(friction_error(&law(0.4, 0.1, 0.2), &law(0.4, 0.3, 0.9)).is_nan());
+    }
 
     #[test]
     fn interpolation_does_not_go_beyond_its_points() {

@@ -173,6 +173,10 @@ fn wall_in_words(wall: &Wall) -> String {
             "truncated cone, radii {} and {} m, {} m long",
             f.radii[0], f.radii[1], f.height
         ),
+        Shape::Cuboid(c) => {
+            let [x, y, z] = (2.0 * c.half_sides).into();
+            format!("block of {x} m x {y} m x {z} m")
+        }
         Shape::SphereShell(s) => format!("sphere of radius {} m", s.radius),
         Shape::Mesh(mesh) => format!("mesh of {} triangles", mesh.triangles().len()),
     };
@@ -215,7 +219,7 @@ fn say_cost(
             "{rate:.3e} grain-steps/s on one thread, measured now on a lattice of {PROBE_GRAINS} such grains"
         ),
     );
-    if !(grains > 0.0) {
+    if grains.is_nan() || grains <= 0.0 {
         lines.say(
             "cost",
             "open: the number of grains comes out of the preparation",

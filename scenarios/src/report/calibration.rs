@@ -1,6 +1,7 @@
 //! The report of a calibration.
 
 mod continuum;
+mod evidence;
 mod thesis;
 
 use super::page::{figure, number, with_error};
@@ -64,6 +65,30 @@ pub struct Comparison {
     pub p: Vec<f64>,
     /// Exact velocity (m/s).
     pub exact_u: Vec<f64>,
+    /// Quantiles 0.025, 0.16, 0.5, 0.84 and 0.975 of the velocity over that of the best law, from the posterior.
+    #[serde(default)]
+    pub band: Option<[f64; 5]>,
+    /// The grains' velocity, mean over the height of their flow (m/s).
+    #[serde(default)]
+    pub grains_u: Option<f64>,
+}
+
+impl Comparison {
+    /// The continuum's mean velocity over the grains', less 1; and whether the grains' lies within 68 and 95 % of the
+    /// posterior.
+    pub fn against_grains(&self) -> Option<(f64, [bool; 2])> {
+        let grains = self.grains_u?;
+        let mean = self.u.iter().sum::<f64>() / self.u.len().max(1) as f64;
+        if !(grains > 0.0 && mean > 0.0) {
+            return None;
+        }
+        let truth = grains / mean;
+        let within = |low: usize, high: usize| {
+            self.band
+                .is_some_and(|b| (b[low]..=b[high]).contains(&truth))
+        };
+        Some((mean / grains - 1.0, [within(1, 3), within(0, 4)]))
+    }
 }
 
 /// A point (I, μ, φ) of the same material from another code.
@@ -121,6 +146,7 @@ pub fn sections(record: &Record, campaign: &Campaign) -> Markup {
             @for sentence in sentences(&result.verdict.text) { p { (sentence) } }
         }
         (law(record, campaign))
+        (evidence::evidence(campaign))
         (angles(campaign))
         (profiles(campaign))
         (continuum::continuum(campaign))
@@ -333,17 +359,18 @@ fn angles(campaign: &Campaign) -> Markup {
         }
         div.wide { table {
             tr {
-                th { "slope" } th { "start" } th { "purpose" } th { "moves" } th { "state" }
+                th { "slope" } th { "bed" } th { "start" } th { "purpose" } th { "moves" } th { "state" }
                 th { "mean velocity [m/s]" } th { "drift" } th { "σ_zz/weight − 1" } th { "overlap/R" }
                 th { "grain-steps" }
             }
             @for run in &runs {
                 tr {
                     td { (format!("{:.2}°", run.slope_degrees)) }
+                    td { (run.bed + 1) }
                     td { @match run.start { Start::Rest => "rest", Start::Flow { .. } => "flow" } }
                     td { @match run.purpose { Purpose::Measure => "measure", Purpose::StopSearch => "stop", Purpose::OnsetSearch => "onset" } }
                     td { @if run.flows() { span.tag.good { "flow" } } @else { span.tag { "no flow" } } }
-                    td { (outcome(run.outcome)) }
+                    td { @match run.unsettled() { Some(why) => (why.words()), None => (outcome(run.outcome)) } }
                     td { (with_error(run.steady.mean, run.steady.mean_error)) }
                     td { (format!("{:+.1} %", 100.0 * run.steady.drift)) }
                     td { @if let Some(c) = &run.checks { (format!("{:.2} %", 100.0 * c.weight_relative)) } @else { "–" } }

@@ -1,5 +1,7 @@
 //! Plots of single runs and comparisons.
 
+mod collapse;
+
 use super::Record;
 use super::page::{figure, number};
 use super::plot::{Mark, Plot};
@@ -13,6 +15,9 @@ const HEIGHT: u32 = 400;
 pub fn plots(record: &Record) -> Markup {
     html! {
         @if let Some(table) = record.table("pareto") { (pareto(&table)) }
+        @if let Some(table) = record.table("profiles") {
+            (collapse::collapse(&table, record.table("front").as_ref()))
+        }
         @if let Some(table) = record.table("trajectory") { (trajectory(&table)) }
         @if let Some(table) = record.table("profile") {
             @if table.column("u_exact").is_empty() {

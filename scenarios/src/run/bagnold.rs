@@ -4,14 +4,14 @@ use super::{Findings, Under, march_record};
 use crate::cost::Cost;
 use crate::failure::Failure;
 use crate::progress::Bar;
-use crate::scene::{BagnoldScene, Scene, SolverMethod};
+use crate::scene::{BagnoldScene, LayerCase, LayerVisitor, Scene, SolverMethod};
 use crate::state_hash;
 use crate::summary::{Model, Quantity, Summary};
 use crate::table::Table;
 use colluvium_continuum::bagnold::{BagnoldCase, BagnoldSolution};
 use colluvium_continuum::flow::{Marching, YieldMethod};
 use colluvium_continuum::layer::{Options, Progress};
-use colluvium_continuum::rheology::MuI;
+use colluvium_continuum::rheology::ShearLaw;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -24,27 +24,6 @@ pub const LEFT_OUT: [&str; 6] = [
     "advection of momentum (zero in a flow along the plane)",
     "non-local effects near the base",
 ];
-
-/// The case that a scene describes.
-pub fn case(scene: &BagnoldScene) -> BagnoldCase {
-    let r = &scene.rheology;
-    BagnoldCase {
-        slope: scene.slope_degrees.to_radians(),
-        depth: scene.depth,
-        gravity: scene.gravity,
-        rheology: MuI {
-            mu_s: r.mu_s,
-            mu_2: r.mu_2,
-            i_0: r.i_0,
-            diameter: r.diameter,
-            solid_fraction: r.solid_fraction,
-            grain_density: r.grain_density,
-            cohesion: r.cohesion,
-        },
-        cells: scene.cells(),
-        columns: (scene.grid.columns > 1).then_some(scene.grid.columns as usize),
-    }
-}
 
 /// The solver's settings that a scene describes.
 pub fn options(scene: &BagnoldScene) -> Options {
@@ -70,7 +49,7 @@ pub fn solve(
     progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
 ) -> Result<(BagnoldSolution, f64), colluvium_continuum::Error> {
     let start = Instant::now();
-    let solution = case(scene).solve(&options(scene), progress)?;
+    let solution = LayerCase::of(scene)?.solve(&options(scene), progress)?;
     Ok((solution, start.elapsed().as_secs_f64()))
 }
 
@@ -86,41 +65,25 @@ pub fn failure(error: colluvium_continuum::Error) -> Failure {
 pub(super) fn check(scene: &Scene, body: &BagnoldScene) -> Result<(), Failure> {
     let named =
         |error: colluvium_continuum::Error| Failure::Input(format!("{}: {error}", scene.origin));
-    case(body).validate().map_err(named)?;
+    LayerCase::of(body)
+        .and_then(|layer| layer.validate())
+        .map_err(named)?;
     options(body).marching.validate().map_err(named)
 }
 
 pub(super) fn run(scene: &BagnoldScene, under: &mut Under) -> Result<Findings, Failure> {
-    let case = case(scene);
-    let mut run = case.begin(&options(scene)).map_err(failure)?;
-    if let Some(saved) = &under.resumed {
-        march_record::take_up(&mut run, &saved.record).map_err(Failure::Input)?;
-    }
-    under.begin()?;
-    let bar = Bar::new("bagnold");
-    let mut farthest = 1.0_f64;
-    while !run.is_over() {
-        run.advance().map_err(failure)?;
-        let progress = run.progress();
-        // Convergence is about geometric, so the logarithm of the distance runs evenly.
-        farthest = farthest.max(progress.distance_to_steady);
-        let left = progress.distance_to_steady.max(1.0).ln() / farthest.ln().max(1e-9);
-        bar.set(1.0 - left);
-        bar.say(&format!(
-            "step {}, {:.3} m/s",
-            progress.step, progress.mean_velocity
-        ));
-        under.checkpoint("march", || march_record::save(&run))?;
-    }
-    bar.clear();
-    let solution = case.solution(&run);
+    let layer = LayerCase::of(scene).map_err(failure)?;
+    let solution = layer.visit(SteadyFlow {
+        options: options(scene),
+        under,
+    })?;
     let wall_s = under.wall_s();
     under.directory.journal.note(&format!(
         "steady after {} steps, {} linear solves, {wall_s:.3} s",
         solution.steps, solution.linear_solves
     ));
     let mut summary = Summary::begun("bagnold", "run");
-    describe(&mut summary, scene, &solution, wall_s);
+    describe(&mut summary, scene, &solution, wall_s)?;
     // One thread computes the layer, however many the pool has.
     summary.cost.threads = 1;
     Ok(Findings {
@@ -128,6 +91,42 @@ pub(super) fn run(scene: &BagnoldScene, under: &mut Under) -> Result<Findings, F
         tables: tables(&solution),
         grains: None,
     })
+}
+
+/// A march from rest, or from where a run was left, to the steady flow.
+struct SteadyFlow<'a, 'u> {
+    options: Options,
+    under: &'a mut Under<'u>,
+}
+
+impl LayerVisitor for SteadyFlow<'_, '_> {
+    type Output = Result<BagnoldSolution, Failure>;
+
+    fn visit<L: ShearLaw>(self, case: &BagnoldCase<L>) -> Self::Output {
+        let under = self.under;
+        let mut run = case.begin(&self.options).map_err(failure)?;
+        if let Some(saved) = &under.resumed {
+            march_record::take_up(&mut run, &saved.record).map_err(Failure::Input)?;
+        }
+        under.begin()?;
+        let bar = Bar::new("bagnold");
+        let mut farthest = 1.0_f64;
+        while !run.is_over() {
+            run.advance().map_err(failure)?;
+            let progress = run.progress();
+            // Convergence is about geometric, so the logarithm of the distance runs evenly.
+            farthest = farthest.max(progress.distance_to_steady);
+            let left = progress.distance_to_steady.max(1.0).ln() / farthest.ln().max(1e-9);
+            bar.set(1.0 - left);
+            bar.say(&format!(
+                "step {}, {:.3} m/s",
+                progress.step, progress.mean_velocity
+            ));
+            under.checkpoint("march", || march_record::save(&run))?;
+        }
+        bar.clear();
+        Ok(case.solution(&run))
+    }
 }
 
 /// Velocity and pressure profile and the history of the march.
@@ -167,8 +166,8 @@ pub fn describe(
     scene: &BagnoldScene,
     solution: &BagnoldSolution,
     wall_s: f64,
-) {
-    let case = case(scene);
+) -> Result<(), Failure> {
+    let layer = LayerCase::of(scene).map_err(failure)?;
     let cells = solution.cells as u64;
     summary.model = Model {
         grains: 0,
@@ -179,15 +178,15 @@ pub fn describe(
         left_out: LEFT_OUT.map(String::from).to_vec(),
     };
     summary.cost = Cost::measured(wall_s, 1, 0, cells * solution.steps as u64);
-    let weight = case.exact_shear_stress(0.0);
+    let weight = layer.base_shear_stress();
     if weight > 0.0 {
         summary.ledger.momentum_relative =
             Some((solution.boundary_shear_stress[0] - weight).abs() / weight);
     }
     summary.state_hash = state_hash::of(&[&solution.u, &solution.p]);
-    summary.remarks.extend(scene.law_remarks());
+    summary.remarks.extend(scene.rheology.remarks());
     let exact = "exact Bagnold profile";
-    let rests = case.slope.tan() <= case.rheology.mu_s;
+    let rests = layer.rests();
     let error_unit = if rests { "m/s" } else { "1" };
     summary.put(
         "velocity_error_l2",
@@ -227,18 +226,18 @@ pub fn describe(
         Quantity::new(solution.linear_solves as f64, "1"),
     );
     if !rests {
-        let inertial_number = case.rheology.inertial_number_at(case.slope.tan());
+        let inertial_number = base_inertial_number(scene, &layer);
         summary.put(
             "inertial_number",
-            Quantity::new(inertial_number, "1").from("where μ(I) is the slope's tangent"),
+            Quantity::new(inertial_number, "1").from("on the base; without cohesion everywhere"),
         );
         summary
             .remarks
-            .extend(validity_remark(scene, inertial_number));
+            .extend(validity_remark(scene, &layer, inertial_number));
     } else {
         summary
             .remarks
-            .push("The slope lies below atan(μ_s): the layer rests.".into());
+            .push("The slope lies below what friction and cohesion hold: the layer rests.".into());
     }
     if solution.ill_posed_fraction > 0.0 {
         summary.remarks.push(format!(
@@ -246,13 +245,26 @@ pub fn describe(
             100.0 * solution.ill_posed_fraction
         ));
     }
+    Ok(())
+}
+
+/// Inertial number on the base, I = γ̇ d √(ρ_s/p).
+pub fn base_inertial_number(scene: &BagnoldScene, layer: &LayerCase) -> f64 {
+    let r = &scene.rheology;
+    layer.base().0 * r.diameter * (r.grain_density / layer.base_pressure()).sqrt()
 }
 
 /// Says so when the flow lies outside what the rheology was measured for.
-pub fn validity_remark(scene: &BagnoldScene, inertial_number: f64) -> Option<String> {
-    let range = scene.rheology.valid_i.as_deref()?;
-    let [low, high] = range else { return None };
-    (inertial_number < *low || inertial_number > *high).then(|| {
+pub fn validity_remark(
+    scene: &BagnoldScene,
+    layer: &LayerCase,
+    inertial_number: f64,
+) -> Option<String> {
+    let [low, high] = match scene.rheology.valid_i.as_deref() {
+        Some([low, high]) => [*low, *high],
+        _ => layer.valid_inertial_numbers()?,
+    };
+    (inertial_number < low || inertial_number > high).then(|| {
         format!(
             "Outside the calibration: I = {inertial_number:.4} at {} degrees, but the rheology was measured for I in [{low:.4}, {high:.4}].",
             scene.slope_degrees

@@ -282,7 +282,7 @@ fn coordination(snapshot: &Snapshot) -> f64 {
             free(contact.grain)
                 + match contact.partner {
                     Partner::Grain(j) => free(j),
-                    Partner::Wall(_) => 0,
+                    Partner::Wall(_) | Partner::Body(_) => 0,
                 }
         })
         .sum();

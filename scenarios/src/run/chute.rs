@@ -84,6 +84,7 @@ pub fn prepare(scene: &ChuteScene, threads: Threads) -> Result<Bed, Failure> {
             law: law.into(),
             grains,
             walls: Vec::new(),
+            bodies: Vec::new(),
             timestep: pace.timestep,
             threads,
         },

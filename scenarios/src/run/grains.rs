@@ -1,5 +1,6 @@
 //! A scene of grains of one's own.
 
+use super::world::fragments;
 use super::world::steps::{self, Around};
 use super::world::workshop::Surroundings;
 use super::world::{Expected, Ran, Recipe, Workshop, World};
@@ -11,7 +12,7 @@ use crate::scene::{GrainsScene, LawKeys, layers};
 use crate::summary::{Figure, Quantity, Summary};
 use crate::table::Table;
 use colluvium_dem::preparation::{Packing, solid_fraction};
-use colluvium_dem::{BoxMotion, Region};
+use colluvium_dem::{BoxMotion, Region, Simulation};
 use nalgebra::Vector3;
 
 impl GrainsScene {
@@ -162,8 +163,8 @@ impl Recipe for GrainsScene {
         list
     }
 
-    fn shows_clusters(&self) -> bool {
-        !self.bonds.is_empty()
+    fn groups(&self, simulation: &mut Simulation, _: &[f64]) -> Option<Vec<Option<usize>>> {
+        (!self.bonds.is_empty()).then(|| fragments::by_bonds(simulation))
     }
 
     fn conclude(&self, ran: &mut Ran, summary: &mut Summary) -> Result<Vec<Table>, Failure> {

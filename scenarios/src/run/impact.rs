@@ -186,6 +186,7 @@ pub fn prepare(scene: &ImpactScene, pair: bool) -> Result<Impact, SceneError> {
             law: law.into(),
             grains,
             walls,
+            bodies: Vec::new(),
             timestep: step.seconds,
             threads: Threads::Serial,
         },

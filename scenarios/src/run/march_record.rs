@@ -2,6 +2,7 @@
 
 use colluvium_continuum::flow::{March, StepRecord};
 use colluvium_continuum::layer::LayerRun;
+use colluvium_continuum::rheology::Rheology;
 use colluvium_continuum::yield_step::{FlowState, Residuals};
 use colluvium_dem::Record;
 
@@ -9,7 +10,7 @@ use colluvium_dem::Record;
 const NUMBERS: usize = 8;
 
 /// A run's state.
-pub fn save(run: &LayerRun) -> Record {
+pub fn save<L: Rheology>(run: &LayerRun<L>) -> Record {
     let (state, time, march) = run.state();
     let mut record = Record::default();
     let mut numbers = |name: &str, values: Vec<f64>| {
@@ -43,7 +44,7 @@ pub fn save(run: &LayerRun) -> Record {
 }
 
 /// Lets a run go on from a state.
-pub fn take_up(run: &mut LayerRun, record: &Record) -> Result<(), String> {
+pub fn take_up<L: Rheology>(run: &mut LayerRun<L>, record: &Record) -> Result<(), String> {
     let &[time, scheduled, next] = record.numbers("flow/march")? else {
         return Err("array `flow/march` must have 3 numbers".into());
     };

@@ -73,6 +73,7 @@ pub fn prepare(scene: &SettleScene, threads: Threads) -> Result<Bed, Failure> {
                 wall(far, -Vector3::x()),
                 wall(far, -Vector3::y()),
             ],
+            bodies: Vec::new(),
             timestep: pace.timestep,
             threads,
         },

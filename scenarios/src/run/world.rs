@@ -10,6 +10,7 @@
 
 pub mod build;
 pub mod course;
+pub mod fragments;
 pub mod history;
 pub mod packing_file;
 pub mod pictures;

@@ -1,6 +1,7 @@
 //! Keys of the continuum on an incline.
 
 use super::SceneError;
+use super::layer_case::LayerCase;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -28,22 +29,59 @@ pub struct BagnoldScene {
     pub solver: SolverKeys,
 }
 
-/// A μ(I) material, by numbers or from a file that `calibrate` wrote.
+/// The law of friction.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum FrictionLaw {
+    /// μ_s + (μ_2 − μ_s) I/(I_0 + I).
+    #[default]
+    MuI,
+    /// A constant friction coefficient mu_s, and a viscosity.
+    Coulomb,
+    /// The partially regularised μ(I) of Barker and Gray (2017): well posed, never rigid.
+    BarkerGray,
+    /// Measured points (I, μ), interpolated.
+    Table,
+}
+
+/// A material, by numbers or from a file that `calibrate` wrote.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RheologyKeys {
     /// A `rheology.toml`; its numbers take the place of the keys below.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<String>,
+    /// The law of friction; it decides which of the numbers below are read.
+    #[serde(default)]
+    pub law: FrictionLaw,
     /// Friction μ_s at I → 0.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 0.0, "maximum" = 5.0))]
-    pub mu_s: f64,
+    pub mu_s: Option<f64>,
     /// Friction μ_2 at I → ∞.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
-    pub mu_2: f64,
+    pub mu_2: Option<f64>,
     /// Inertial number I_0 half way between.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
-    pub i_0: f64,
+    pub i_0: Option<f64>,
+    /// α of Barker and Gray's branch at small I, √(α/ln(A/I)).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 2.0))]
+    pub alpha: Option<f64>,
+    /// μ_∞ of Barker and Gray's branch at large I, where μ grows as μ_∞ I.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minimum" = 0.0, "maximum" = 100.0))]
+    pub mu_infinity: Option<f64>,
+    /// Viscosity η beside Coulomb's friction (Pa s).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minimum" = 0.0, "maximum" = 1.0e12))]
+    pub viscosity: Option<f64>,
+    /// Points [I, μ] of a measured law, with rising I and μ that does not fall.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minItems" = 2, "items" = {"type": "array", "minItems": 2, "maxItems": 2, "items": {"type": "number", "minimum": 0.0, "maximum": 1.0e6}}))]
+    pub table: Option<Vec<Vec<f64>>>,
     /// Grain diameter d (m).
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0))]
     pub diameter: f64,
@@ -70,6 +108,25 @@ pub struct RheologyKeys {
     /// Where the numbers come from.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub source: Option<String>,
+}
+
+impl RheologyKeys {
+    /// What has to be known of the law beyond its numbers, in words.
+    pub fn remarks(&self) -> Vec<String> {
+        let source = self.source.as_deref().unwrap_or("the scene");
+        let mut remarks = Vec::new();
+        if self.identified == Some(false) {
+            remarks.push(format!(
+                "Not identified: the data of the law from {source} do not determine μ_s, μ_2 and I_0 apart; outside the measured range it says nothing."
+            ));
+        }
+        if self.good == Some(false) {
+            remarks.push(format!(
+                "The calibration of the law from {source} was judged not good enough to feed a continuum."
+            ));
+        }
+        remarks
+    }
 }
 
 /// The grid.
@@ -123,24 +180,6 @@ impl BagnoldScene {
         (self.grid.cells as f64 * self.scale).round().max(4.0) as usize
     }
 
-    /// What has to be known of the law beyond its numbers, in words.
-    pub fn law_remarks(&self) -> Vec<String> {
-        let r = &self.rheology;
-        let source = r.source.as_deref().unwrap_or("the scene");
-        let mut remarks = Vec::new();
-        if r.identified == Some(false) {
-            remarks.push(format!(
-                "Not identified: the data of the law from {source} do not determine μ_s, μ_2 and I_0 apart; outside the measured range it says nothing."
-            ));
-        }
-        if r.good == Some(false) {
-            remarks.push(format!(
-                "The calibration of the law from {source} was judged not good enough to feed a continuum."
-            ));
-        }
-        remarks
-    }
-
     pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {
         if self.grid.columns == 2 {
             return Err(SceneError::OutOfRange {
@@ -178,26 +217,39 @@ impl BagnoldScene {
                 range: "[low, high] with low < high".into(),
             });
         }
-        if r.mu_2 < r.mu_s {
+        if let (Some(mu_s), Some(mu_2)) = (r.mu_s, r.mu_2)
+            && mu_2 < mu_s
+        {
             return Err(SceneError::OutOfRange {
                 file: origin.to_owned(),
                 key: "rheology.mu_2".into(),
-                value: r.mu_2.to_string(),
-                range: format!("at least rheology.mu_s = {}", r.mu_s),
+                value: mu_2.to_string(),
+                range: format!("at least rheology.mu_s = {mu_s}"),
             });
         }
-        let tangent = self.slope_degrees.to_radians().tan();
-        if tangent >= r.mu_2 {
-            return Err(SceneError::OutOfRange {
-                file: origin.to_owned(),
-                key: "slope_degrees".into(),
-                value: self.slope_degrees.to_string(),
-                range: format!(
-                    "[0, {:.4}): above atan(rheology.mu_2) the flow accelerates for ever and has no steady state",
-                    r.mu_2.atan().to_degrees()
-                ),
-            });
-        }
+        // The same checks as the solver's, with the scene's name in front.
+        LayerCase::of(self)
+            .and_then(|layer| layer.validate())
+            .map_err(|error| match error {
+                colluvium_continuum::Error::OutOfRange {
+                    key,
+                    value,
+                    allowed,
+                } => SceneError::OutOfRange {
+                    file: origin.to_owned(),
+                    key: key.into(),
+                    // As it was written, not there and back through radians.
+                    value: match key {
+                        "slope_degrees" => self.slope_degrees.to_string(),
+                        _ => value.to_string(),
+                    },
+                    range: allowed,
+                },
+                other => SceneError::Unreadable {
+                    file: origin.to_owned(),
+                    message: other.to_string(),
+                },
+            })?;
         Ok(())
     }
 }

@@ -100,8 +100,8 @@ pub enum SceneError {
         /// Why the engine refuses it.
         reason: String,
     },
-    /// A key that the chosen contact law does not read.
-    #[error("{file}: key `{key}` = {value} is not read by this contact law: {law}")]
+    /// A key that the chosen law does not read.
+    #[error("{file}: key `{key}` = {value} is not read by this law: {law}")]
     Unread {
         /// Where it was read.
         file: String,

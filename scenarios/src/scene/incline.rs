@@ -168,9 +168,26 @@ pub struct TimeKeys {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CalibrationKeys {
-    /// Angles run from flow to measure μ(I) (degrees).
-    #[schemars(extend("minItems" = 1, "maxItems" = 60, "items" = {"type": "number", "exclusiveMinimum": 0.0, "exclusiveMaximum": 90.0}))]
+    /// Angles run from flow to measure μ(I) (degrees); none: `flow_count` angles are chosen where, by the guess,
+    /// they tell most about μ_s, μ_2 and I_0.
+    #[schemars(extend("minItems" = 0, "maxItems" = 60, "items" = {"type": "number", "exclusiveMinimum": 0.0, "exclusiveMaximum": 90.0}))]
     pub flow_degrees: Vec<f64>,
+    /// How many angles are chosen where `flow_degrees` is empty.
+    #[serde(default = "seven")]
+    #[schemars(extend("minimum" = 4, "maximum" = 60))]
+    pub flow_count: u64,
+    /// Beds of different seeds that the searches try at each slope: one alone leaves ±2 degrees.
+    #[serde(default = "one")]
+    #[schemars(extend("minimum" = 1, "maximum" = 64))]
+    pub beds: u64,
+    /// With how many of these beds each flow is measured.
+    #[serde(default = "one")]
+    #[schemars(extend("minimum" = 1, "maximum" = 64))]
+    pub flow_beds: u64,
+    /// Shallower (or deeper) beds, as factors of the depth, for which the stop is sought too: h_stop(θ).
+    #[serde(default)]
+    #[schemars(extend("minItems" = 0, "maxItems" = 20, "items" = {"type": "number", "minimum": 0.05, "maximum": 4.0}))]
+    pub depths: Vec<f64>,
     /// Where a flowing bed stops, bracketed from flow.
     pub stop: Bracket,
     /// Where a bed at rest starts to flow, bracketed from rest.
@@ -192,6 +209,14 @@ pub struct CalibrationKeys {
     /// Cells across the depth in that comparison.
     #[schemars(extend("minimum" = 8, "maximum" = 1024))]
     pub compare_cells: u64,
+}
+
+fn one() -> u64 {
+    1
+}
+
+fn seven() -> u64 {
+    7
 }
 
 /// A guess of μ(I) against σ_zz: the nearer to the truth, the sooner flows are steady. Results do
@@ -379,6 +404,13 @@ impl InclineScene {
                     format!("({}, 90), above {name}.low", bracket.low),
                 );
             }
+        }
+        if self.calibration.flow_beds > self.calibration.beds {
+            return out_of_range(
+                "calibration.flow_beds",
+                self.calibration.flow_beds as f64,
+                format!("[1, {}], at most calibration.beds", self.calibration.beds),
+            );
         }
         let guess = self.calibration.guess;
         if guess.mu_2 <= guess.mu_s {

@@ -2,7 +2,10 @@
 //!
 //! A scene is a struct of keys, a recipe (`run::world::Recipe`) and a bundled file of the same name.
 
-use super::{AngleOfReposeScene, BallImpactScene, GrainsScene, SceneError, SiloScene};
+use super::{
+    AngleOfReposeScene, BallImpactScene, BoulderScene, GrainsScene, SceneError, SiloScene,
+    TensileScene, TumblingBoxScene,
+};
 use crate::run::world::Recipe;
 use serde_json::Value;
 
@@ -11,7 +14,7 @@ macro_rules! kinds {
         /// A scene of grains.
         #[derive(Clone, Debug, PartialEq)]
         pub enum Kind {
-            $($(#[$doc])* $variant($keys)),*
+            $($(#[$doc])* $variant(Box<$keys>)),*
         }
 
         impl Kind {
@@ -21,7 +24,7 @@ macro_rules! kinds {
             /// Reads the keys of the scene of this name.
             pub fn read(name: &str, table: toml::Table) -> Option<Result<Kind, toml::de::Error>> {
                 match name {
-                    $($name => Some(table.try_into().map(Kind::$variant)),)*
+                    $($name => Some(table.try_into().map(|keys| Kind::$variant(Box::new(keys)))),)*
                     _ => None,
                 }
             }
@@ -51,7 +54,7 @@ macro_rules! kinds {
             /// What it does.
             pub fn recipe(&self) -> &dyn Recipe {
                 match self {
-                    $(Kind::$variant(keys) => keys,)*
+                    $(Kind::$variant(keys) => keys.as_ref(),)*
                 }
             }
         }
@@ -61,12 +64,18 @@ macro_rules! kinds {
 kinds! {
     /// A recipe of one's own.
     Grains(GrainsScene) = "grains",
+    /// A cylinder pulled to its breaking point.
+    Tensile(TensileScene) = "tensile-test",
+    /// A boulder dropped on a plane.
+    Boulder(BoulderScene) = "boulder-drop",
     /// The angle at which an avalanche comes to rest.
     AngleOfRepose(AngleOfReposeScene) = "angle-of-repose",
     /// Silos that run out.
     Silo(SiloScene) = "silo",
     /// A ball that falls into a bed.
     BallImpact(BallImpactScene) = "ball-impact",
+    /// A lander on a bed.
+    TumblingBox(TumblingBoxScene) = "tumbling-box",
 }
 
 /// Dotted paths of files in scenes of grains; `*` stands for any name.

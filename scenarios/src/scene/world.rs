@@ -68,11 +68,16 @@ impl Place<'_> {
         key: &str,
         wanted: &str,
     ) -> Result<T, SceneError> {
-        value.clone().ok_or_else(|| SceneError::MissingKey {
+        value.clone().ok_or_else(|| self.missing(key, wanted))
+    }
+
+    /// The error that a key has to be there.
+    pub fn missing(&self, key: &str, wanted: &str) -> SceneError {
+        SceneError::MissingKey {
             file: self.origin.to_owned(),
             key: self.key(key),
             wanted: wanted.to_owned(),
-        })
+        }
     }
 
     /// Refuses keys that are given though a choice does not read them.

@@ -32,10 +32,10 @@ pub(super) fn continuum(campaign: &Campaign) -> Markup {
             div.wide { table {
                 tr {
                     th { "slope" } th.text { "law" } th { "I" } th { "mean u [m/s]" } th { "grains' mean u [m/s]" }
-                    th { "difference" } th { "error against exact" } th { "wall [s]" }
+                    th { "difference" } th { "posterior, 95 %" } th { "grains within" } th { "error against exact" } th { "wall [s]" }
                 }
                 @for c in &campaign.comparisons {
-                    @let grains = flows.iter().find(|r| r.slope_degrees == c.slope_degrees).map(|r| r.steady.mean);
+                    @let grains = c.grains_u.or_else(|| flows.iter().find(|r| r.slope_degrees == c.slope_degrees).map(|r| r.steady.mean));
                     @let mean = c.u.iter().sum::<f64>() / c.u.len().max(1) as f64;
                     tr {
                         td { (c.slope_degrees) "°" }
@@ -44,6 +44,8 @@ pub(super) fn continuum(campaign: &Campaign) -> Markup {
                         td { (number(mean)) }
                         td { @if let Some(g) = grains { (number(g)) } }
                         td { @if let Some(g) = grains { (format!("{:+.1} %", 100.0 * (mean / g - 1.0))) } }
+                        td { @if let Some(b) = c.band { (format!("{:+.0} … {:+.0} %", 100.0 * (b[0] - 1.0), 100.0 * (b[4] - 1.0))) } }
+                        td { @match c.against_grains() { Some((_, [true, _])) => "68 %", Some((_, [_, true])) => "95 %", Some(_) => "outside", None => "–" } }
                         td { (number(c.velocity_error)) }
                         td { (number(c.wall_s)) }
                     }

@@ -6,8 +6,8 @@ use crate::scene::world::Materials;
 use colluvium_dem::preparation::Packing;
 use colluvium_dem::timestep::{self, Choice, Conditions, Shares};
 use colluvium_dem::{
-    BondRule, BoxMotion, Domain, Grain, HeavySphere, Outlet, Record, Region, Schedule, SelfGravity,
-    Setup, SetupError, Simulation, Threads, Wall,
+    Body, BondRule, BoxMotion, Domain, Grain, HeavySphere, Outlet, Record, Region, Schedule,
+    SelfGravity, Setup, SetupError, Simulation, Threads, Wall,
 };
 use nalgebra::Vector3;
 
@@ -26,6 +26,8 @@ pub struct World {
     pub own_gravity: Option<SelfGravity>,
     /// Walls with their names.
     pub walls: Vec<(String, Wall)>,
+    /// Rigid bodies with their names.
+    pub bodies: Vec<(String, Body)>,
     /// Bonds that are made at the start.
     pub bonds: Vec<BondRule>,
     /// Where bonds are taken away again.
@@ -54,6 +56,7 @@ impl World {
             sphere: None,
             own_gravity: None,
             walls: Vec::new(),
+            bodies: Vec::new(),
             bonds: Vec::new(),
             cracks: Vec::new(),
             box_motion: BoxMotion::Rest,
@@ -106,6 +109,7 @@ impl Stand {
             law: materials.laws.clone(),
             grains,
             walls: world.walls.iter().map(|(_, wall)| wall.clone()).collect(),
+            bodies: world.bodies.iter().map(|(_, body)| body.clone()).collect(),
             timestep: 1.0,
             threads,
         };

@@ -256,7 +256,8 @@ fn follow(run: Followed, under: &mut Under) -> Result<(), Failure> {
     }
     bar.clear();
     let done = simulation.steps_done();
-    pictures.last(simulation, done)?;
+    let groups = recipe.groups(simulation, state);
+    pictures.last(simulation, done, groups.as_deref())?;
     frames.join(done)
 }
 

@@ -43,7 +43,7 @@ const SPEEDS: [[f64; 3]; 5] = [
 enum Colouring {
     Kinds,
     Speeds,
-    Clusters,
+    Groups,
 }
 
 impl Colouring {
@@ -51,7 +51,7 @@ impl Colouring {
         match self {
             Colouring::Kinds => "kinds",
             Colouring::Speeds => "speeds",
-            Colouring::Clusters => "clusters",
+            Colouring::Groups => "groups",
         }
     }
 }
@@ -60,7 +60,6 @@ impl Colouring {
 #[derive(Debug)]
 pub struct Pictures<'a> {
     view: [Vector3<f64>; 2],
-    clusters: bool,
     kinds: &'a [String],
     between: u64,
     directory: &'a RunDirectory,
@@ -83,7 +82,6 @@ impl<'a> Pictures<'a> {
     ) -> Pictures<'a> {
         Pictures {
             view: recipe.view(),
-            clusters: recipe.shows_clusters(),
             kinds: &materials.names,
             between: recipe.output().pictures,
             directory,
@@ -108,26 +106,36 @@ impl<'a> Pictures<'a> {
             } else {
                 Colouring::Speeds
             };
-            return self.draw(simulation, first);
+            return self.draw(simulation, first, &[]);
         }
         if step < steps && self.next(step - 1, steps) == step {
-            self.draw(simulation, Colouring::Speeds)?;
+            self.draw(simulation, Colouring::Speeds, &[])?;
         }
         Ok(())
     }
 
-    /// Takes the pictures of the end.
-    pub fn last(&self, simulation: &mut Simulation, step: u64) -> Result<(), Failure> {
+    /// Takes the pictures of the end; `groups` say what hangs together.
+    pub fn last(
+        &self,
+        simulation: &mut Simulation,
+        step: u64,
+        groups: Option<&[Option<usize>]>,
+    ) -> Result<(), Failure> {
         if step > 0 {
-            self.draw(simulation, Colouring::Speeds)?;
+            self.draw(simulation, Colouring::Speeds, &[])?;
         }
-        if self.clusters {
-            self.draw(simulation, Colouring::Clusters)?;
+        match groups {
+            Some(groups) => self.draw(simulation, Colouring::Groups, groups),
+            None => Ok(()),
         }
-        Ok(())
     }
 
-    fn draw(&self, simulation: &mut Simulation, colouring: Colouring) -> Result<(), Failure> {
+    fn draw(
+        &self,
+        simulation: &mut Simulation,
+        colouring: Colouring,
+        groups: &[Option<usize>],
+    ) -> Result<(), Failure> {
         let [away, up] = self.view;
         let right = away.cross(&up);
         let grains = simulation.grain_list();
@@ -140,17 +148,13 @@ impl<'a> Pictures<'a> {
                 .filter(|g| !g.fixed)
                 .map(|g| g.velocity.norm()),
         );
-        let boulders = match colouring {
-            Colouring::Clusters => boulders(simulation),
-            _ => Vec::new(),
-        };
         let colour = |k: usize, grain: &colluvium_dem::Grain| match colouring {
             _ if grain.fixed => PLAIN,
             Colouring::Kinds => PALETTE[usize::from(grain.material) % PALETTE.len()],
             Colouring::Speeds => {
                 speed_colour(grain.velocity.norm() / fastest.max(f64::MIN_POSITIVE))
             }
-            Colouring::Clusters => match boulders.get(k).copied().flatten() {
+            Colouring::Groups => match groups.get(k).copied().flatten() {
                 Some(rank) => PALETTE[rank % PALETTE.len()],
                 None => PLAIN,
             },
@@ -176,7 +180,7 @@ impl<'a> Pictures<'a> {
                 .collect::<Vec<_>>()
                 .join(", "),
             Colouring::Speeds => format!("speed from 0 (violet) to {fastest:.3e} m/s (yellow)"),
-            Colouring::Clusters => "clusters held together by bonds, single grains grey".to_owned(),
+            Colouring::Groups => "what hangs together, single grains grey".to_owned(),
         };
         let caption = format!("t = {:.4e} s; {text}", simulation.time());
         let name = format!(
@@ -250,20 +254,6 @@ fn speed_colour(share: f64) -> [u8; 3] {
     let low = (at as usize).min(SPEEDS.len() - 2);
     let part = at - low as f64;
     std::array::from_fn(|c| (SPEEDS[low][c] + part * (SPEEDS[low + 1][c] - SPEEDS[low][c])) as u8)
-}
-
-/// For each grain in the order of numbers, the rank of its cluster by mass, if it has partners.
-fn boulders(simulation: &mut Simulation) -> Vec<Option<usize>> {
-    let clusters = simulation.clusters();
-    let mut seen = colluvium_dem::Snapshot::default();
-    simulation.snapshot(&mut seen);
-    let mut order: Vec<usize> = (0..seen.grains.len()).collect();
-    order.sort_by_key(|&i| seen.grains[i].id);
-    let rank = |i: usize| {
-        let cluster = clusters.of[i];
-        (clusters.list[cluster].grains > 1).then_some(cluster)
-    };
-    order.into_iter().map(rank).collect()
 }
 
 /// Pixels as rows of RGB from the top, and their numbers along both edges.

@@ -115,9 +115,10 @@ pub trait Recipe: Debug + Sync {
         [Vector3::y(), Vector3::z()]
     }
 
-    /// Whether pictures show clusters besides speeds.
-    fn shows_clusters(&self) -> bool {
-        false
+    /// What hangs together at the end, for a picture: for each grain in the order of numbers the rank of
+    /// its group by mass, none for single grains. None where no picture of it is wanted.
+    fn groups(&self, _simulation: &mut Simulation, _state: &[f64]) -> Option<Vec<Option<usize>>> {
+        None
     }
 
     /// Results of the run for the summary, and further tables.

@@ -117,6 +117,7 @@ pub fn step_for(materials: &Materials, around: &Surroundings, safety: f64) -> Op
         law: around.laws.clone(),
         grains,
         walls: around.walls.clone(),
+        bodies: Vec::new(),
         timestep: 1.0,
         threads: Threads::Serial,
     };
@@ -182,6 +183,7 @@ impl<'a> Workshop<'a> {
             law: around.laws.clone(),
             grains: self.packing.grains.clone(),
             walls: around.walls.clone(),
+            bodies: Vec::new(),
             timestep: 1.0,
             threads: self.threads,
         };
@@ -274,6 +276,21 @@ impl<'a> Workshop<'a> {
         Ok(())
     }
 
+    /// Lets the grains go for a time (s), and stops what still moves.
+    pub fn let_go(&mut self, around: &Surroundings, time: f64) -> Result<(), Failure> {
+        let mut simulation = self.simulation(around)?;
+        let steps = (time / simulation.timestep()).ceil() as u64;
+        simulation
+            .advance(steps)
+            .map_err(|error| Failure::Run(format!("preparation: {error}")))?;
+        simulation.damp(0.0);
+        self.take(simulation);
+        if crate::interruption::requested() {
+            return Err(ended(SetupError::Interrupted));
+        }
+        Ok(())
+    }
+
     /// Pulls a cloud to a point until it is dense enough.
     pub fn compact(
         &mut self,
@@ -295,6 +312,7 @@ impl<'a> Workshop<'a> {
             law: around.laws.clone(),
             grains: self.packing.grains.clone(),
             walls: around.walls.clone(),
+            bodies: Vec::new(),
             timestep: 1.0,
             threads: self.threads,
         };

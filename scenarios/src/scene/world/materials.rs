@@ -69,15 +69,12 @@ impl Materials {
 
 /// Numbers of `upper` laid over those of `base`.
 fn laid_over(base: &LawKeys, upper: &LawKeys) -> LawKeys {
-    let both = (
-        toml::Table::try_from(base.clone()),
-        toml::Table::try_from(upper.clone()),
-    );
+    let both = (toml::Table::try_from(base), toml::Table::try_from(upper));
     let (Ok(mut table), Ok(upper)) = both else {
-        return base.clone();
+        return *base;
     };
     table.extend(upper);
-    table.try_into().unwrap_or_else(|_| base.clone())
+    table.try_into().unwrap_or(*base)
 }
 
 /// The materials of a scene whose parcels are `factor` times as large as its grains.
@@ -93,9 +90,7 @@ pub fn materials(
         section: "",
     };
     if grains.is_empty() {
-        return Err(top
-            .need::<()>(&None, "grains", "a section [grains.NAME] at least")
-            .unwrap_err());
+        return Err(top.missing("grains", "a section [grains.NAME] at least"));
     }
     let law = |own: Option<&LawKeys>, section: &str| -> Result<ContactLaw, SceneError> {
         let keys = match own {
@@ -103,7 +98,7 @@ pub fn materials(
                 check_own(contact, own, origin, section)?;
                 laid_over(contact, own)
             }
-            None => contact.clone(),
+            None => *contact,
         };
         Ok(keys.law(origin)?.coarse_grained(factor))
     };
@@ -157,7 +152,7 @@ pub fn materials(
 /// Refuses keys of a material that the law does not read.
 fn check_own(base: &LawKeys, own: &LawKeys, origin: &str, section: &str) -> Result<(), SceneError> {
     let reads = base.parts().reads();
-    let table = toml::Table::try_from(own.clone()).unwrap_or_default();
+    let table = toml::Table::try_from(own).unwrap_or_default();
     let stray = table.iter().find(|(key, _)| !reads.contains(&key.as_str()));
     match stray {
         Some((key, value)) => Err(SceneError::Unread {

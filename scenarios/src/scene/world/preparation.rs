@@ -145,9 +145,7 @@ impl PrepareKeys {
         )?;
         let bounded = [Insert, Pour, Trim, Glue];
         if bounded.contains(&kind) && self.within.is_empty() {
-            return Err(at
-                .need::<()>(&None, "within", "a list of regions")
-                .unwrap_err());
+            return Err(at.missing("within", "a list of regions"));
         }
         let amounts = [
             self.count.map(Amount::Grains),
@@ -160,7 +158,7 @@ impl PrepareKeys {
             amount = given.next();
             if amount.is_none() || given.next().is_some() {
                 let wanted = "exactly one of count, solid_fraction, mass";
-                return Err(at.need::<()>(&None, "count", wanted).unwrap_err());
+                return Err(at.missing("count", wanted));
             }
         }
         if [Jam, Grow].contains(&kind) {

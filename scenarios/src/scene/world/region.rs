@@ -19,6 +19,8 @@ pub enum RegionKind {
     Slab,
     /// A cylinder without ends.
     Cylinder,
+    /// A truncated cone from `point` along `axis` over `length`, of `radii` at both ends.
+    Frustum,
 }
 
 /// A part of space (m).
@@ -43,6 +45,13 @@ pub struct RegionKeys {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
     pub radius: Option<f64>,
+    /// Radii of a frustum at `point` and at its other end (m).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radii: Option<[f64; 2]>,
+    /// Length of a frustum (m).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
+    pub length: Option<f64>,
     /// Thickness of a slab (m).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
@@ -82,15 +91,29 @@ impl RegionKeys {
                 axis: axis()?,
                 radius: radius()?,
             },
+            RegionKind::Frustum => Region::Frustum {
+                point: point()?,
+                axis: axis()?,
+                length: at.need(&self.length, "length", "a length in m")?,
+                radii: at.need(&self.radii, "radii", "two radii in m")?,
+            },
         };
-        use RegionKind::{Ball, Block, Cylinder, Slab};
+        use RegionKind::{Ball, Block, Cylinder, Frustum, Slab};
         let only = |given: bool, shapes: &[RegionKind]| given && !shapes.contains(&self.shape);
         at.unread(
             &[
                 ("lower", only(self.lower.is_some(), &[Block])),
                 ("upper", only(self.upper.is_some(), &[Block])),
-                ("point", only(self.point.is_some(), &[Ball, Slab, Cylinder])),
-                ("axis", only(self.axis.is_some(), &[Slab, Cylinder])),
+                (
+                    "point",
+                    only(self.point.is_some(), &[Ball, Slab, Cylinder, Frustum]),
+                ),
+                (
+                    "axis",
+                    only(self.axis.is_some(), &[Slab, Cylinder, Frustum]),
+                ),
+                ("radii", only(self.radii.is_some(), &[Frustum])),
+                ("length", only(self.length.is_some(), &[Frustum])),
                 ("radius", only(self.radius.is_some(), &[Ball, Cylinder])),
                 ("thickness", only(self.thickness.is_some(), &[Slab])),
             ],

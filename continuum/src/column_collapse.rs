@@ -1,0 +1,227 @@
+//! Collapse of a column of granular matter on a rough floor.
+//!
+//! A column of height H and width L fills 0 < x < L beside a smooth wall (a plane of symmetry) and is
+//! let go at t = 0. What is asked for is how far it runs out, (x_f − L)/L, and what deposit it
+//! leaves, as a function of the aspect ratio a = H/L. Experiments: Lajeunesse, Monnier & Homsy,
+//! *Phys. Fluids* 17 (2005) 103302; Lube, Huppert, Sparks & Freundt, *Phys. Rev. E* 72 (2005)
+//! 041301. μ(I) continuum: Lagrée, Staron & Popinet, *J. Fluid Mech.* 686 (2011) 378.
+
+use serde::{Deserialize, Serialize};
+
+use crate::error::{Error, require};
+use crate::free_surface::{SurfaceFlow, SurfaceOptions, SurfaceState, SurfaceStep};
+use crate::grid::{Axis, Boundary, Grid};
+use crate::rheology::{MuI, Rheology};
+use crate::units::Units;
+
+/// A column to collapse; SI units.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields)]
+pub struct CollapseCase {
+    /// Aspect ratio a = height over width.
+    pub aspect: f64,
+    /// Height H of the column (m).
+    pub height: f64,
+    /// Gravity (m/s²).
+    pub gravity: f64,
+    /// The material.
+    pub rheology: MuI,
+    /// Cells along x.
+    pub cells: usize,
+    /// Length of the grid over the height of the column.
+    pub length_scaled: f64,
+}
+
+/// Height of the grid over the height of the column.
+const ROOM_ABOVE: f64 = 1.25;
+/// Fewest cells across the height or the width of the column.
+const FEWEST_CELLS: f64 = 4.0;
+/// Material counts as at rest when nothing moves faster than this many ε H.
+const REST_SPEED: f64 = 5.0;
+
+impl CollapseCase {
+    /// Width L = H/a of the column (m).
+    pub fn width(&self) -> f64 {
+        self.height / self.aspect
+    }
+
+    /// Refuses parameters out of range.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] with the key, the value and the allowed range.
+    pub fn validate(&self) -> Result<(), Error> {
+        self.rheology.validate()?;
+        for (key, value) in [
+            ("aspect", self.aspect),
+            ("height", self.height),
+            ("gravity", self.gravity),
+        ] {
+            require(value > 0.0, key, value, "greater than 0 and finite")?;
+        }
+        require(
+            self.length_scaled > 1.0 / self.aspect,
+            "grid.length_scaled",
+            self.length_scaled,
+            format!("greater than the column, 1/aspect = {}", 1.0 / self.aspect),
+        )?;
+        let per_height = self.cells as f64 / self.length_scaled;
+        let smallest = per_height.min(per_height / self.aspect);
+        require(
+            smallest >= FEWEST_CELLS,
+            "grid.cells",
+            self.cells as f64,
+            format!(
+                "at least {} for {FEWEST_CELLS} cells across the column",
+                (self.cells as f64 * FEWEST_CELLS / smallest).ceil()
+            ),
+        )
+    }
+
+    /// Natural units of the computation: height, bulk density, √(g H).
+    pub fn units(&self) -> Units {
+        Units::of_gravity(self.height, self.rheology.bulk_density(), self.gravity)
+    }
+
+    /// The column at rest, in natural units.
+    fn flow(&self, options: &SurfaceOptions) -> Result<SurfaceFlow<MuI>, Error> {
+        let spacing = self.length_scaled / self.cells as f64;
+        let rows = (ROOM_ABOVE / spacing).ceil().max(1.0) as usize;
+        let axis = |cells: usize, low| Axis::Bounded {
+            length: spacing * cells as f64,
+            cells,
+            low,
+            high: Boundary::FreeSlip,
+        };
+        let grid = Grid::with_moving_surface([
+            axis(self.cells, Boundary::FreeSlip),
+            axis(rows, Boundary::NoSlip { velocity: 0.0 }),
+        ])?;
+        let covered = |length: f64, index: usize| (length / spacing - index as f64).clamp(0.0, 1.0);
+        let fractions = (0..rows)
+            .flat_map(|k| (0..self.cells).map(move |i| (i, k)))
+            .map(|(i, k)| covered(1.0 / self.aspect, i) * covered(1.0, k))
+            .collect();
+        SurfaceFlow::at_rest(
+            grid,
+            fractions,
+            self.rheology.in_units(&self.units()),
+            [0.0, -1.0],
+            *options,
+        )
+    }
+}
+
+/// Where the heap is at one time; SI units.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Front {
+    /// Time (s).
+    pub time: f64,
+    /// The farthest x at which the heap is as high as the threshold (m).
+    pub position: f64,
+    /// Greatest height of the heap (m).
+    pub height: f64,
+}
+
+/// A collapse under way.
+pub struct Collapse {
+    case: CollapseCase,
+    units: Units,
+    flow: SurfaceFlow<MuI>,
+    rest_speed: f64,
+    start_volume: f64,
+}
+
+impl Collapse {
+    /// The column before it is let go.
+    ///
+    /// # Errors
+    /// Parameters or settings out of range.
+    pub fn new(case: &CollapseCase, options: &SurfaceOptions) -> Result<Self, Error> {
+        case.validate()?;
+        let flow = case.flow(options)?;
+        Ok(Self {
+            case: *case,
+            units: case.units(),
+            rest_speed: REST_SPEED * options.solver.strain_rate_floor,
+            start_volume: flow.volume(),
+            flow,
+        })
+    }
+
+    /// The natural units of the computation.
+    pub fn units(&self) -> &Units {
+        &self.units
+    }
+
+    /// The flow, in natural units.
+    pub fn flow(&self) -> &SurfaceFlow<MuI> {
+        &self.flow
+    }
+
+    /// The flow by itself, in natural units.
+    pub fn into_flow(self) -> SurfaceFlow<MuI> {
+        self.flow
+    }
+
+    /// Goes on from a state of the same case.
+    ///
+    /// # Errors
+    /// [`Error::ForeignState`] if the state belongs to another grid.
+    pub fn set_state(&mut self, state: SurfaceState) -> Result<(), Error> {
+        self.flow.set_state(state)
+    }
+
+    /// Makes one step that ends at time `until` (s) at the latest; what it reports is in natural
+    /// units.
+    ///
+    /// # Errors
+    /// [`Error::NotConverged`].
+    pub fn step(&mut self, until: f64) -> Result<SurfaceStep, Error> {
+        self.flow
+            .step(until / self.units.time() - self.flow.state().time)
+    }
+
+    /// Time (s).
+    pub fn time(&self) -> f64 {
+        self.flow.state().time * self.units.time()
+    }
+
+    /// Whether a step left everything at rest: speeds below 5 ε H, which is what the strain-rate
+    /// floor ε lets rigid matter creep at.
+    pub fn is_at_rest(&self, step: &SurfaceStep) -> bool {
+        step.max_speed < self.rest_speed
+    }
+
+    /// Volume gained since the start, relative.
+    pub fn volume_drift(&self) -> f64 {
+        self.flow.volume() / self.start_volume - 1.0
+    }
+
+    /// Positions of the columns of cells (m) and the height of material in each (m).
+    pub fn profile(&self) -> (Vec<f64>, Vec<f64>) {
+        let spacing = self.flow.grid().axes()[0].spacing() * self.case.height;
+        let heights = self.flow.heights();
+        let positions = (0..heights.len()).map(|i| (i as f64 + 0.5) * spacing);
+        (
+            positions.collect(),
+            heights.iter().map(|h| h * self.case.height).collect(),
+        )
+    }
+
+    /// Where the heap reaches down to a height (m).
+    pub fn front(&self, threshold: f64) -> Front {
+        let (x, h) = self.profile();
+        let height = h.iter().fold(0.0_f64, |most, h| most.max(*h));
+        let last = (0..h.len()).rev().find(|&i| h[i] >= threshold);
+        let position = match last {
+            None => 0.0,
+            Some(i) if i + 1 == h.len() => x[i],
+            Some(i) => x[i] + (x[i + 1] - x[i]) * (h[i] - threshold) / (h[i] - h[i + 1]),
+        };
+        Front {
+            time: self.time(),
+            position,
+            height,
+        }
+    }
+}

@@ -1,0 +1,20 @@
+//! Material with a moving free surface: how much of it lies in each cell, where its surface is, and
+//! how it moves.
+//!
+//! There is no air. A step moves volume and momentum ([`SurfaceFlow`]), finds out which velocities
+//! and pressures are unknowns where the material now lies, and solves for velocity, pressure and
+//! stress at once. Cells without material cost next to nothing.
+//!
+//! Axes are looped over by number and planes have three components, so that a third axis is a longer
+//! array; only the corners of quadrature points are written for a plane.
+
+mod faces;
+mod flow;
+mod fraction;
+mod operators;
+pub mod plane;
+mod topology;
+mod transport;
+
+pub use faces::ThinLayer;
+pub use flow::{Spent, SurfaceFlow, SurfaceOptions, SurfaceState, SurfaceStep};

@@ -1,0 +1,238 @@
+//! Which velocities are unknowns when material fills part of a grid.
+//!
+//! A cell more than half full is *active*: its centre lies in the material and carries a pressure. A
+//! face of an active cell carries an unknown velocity. What lies in less filled cells above them
+//! *follows*: such a face moves with the nearest unknown towards the material and adds its mass to
+//! it, so mass and momentum of a step are complete. Material that nothing active touches is
+//! *loose*: it flies.
+
+use super::topology::{NONE, Topology};
+use super::transport::{MASSLESS, Velocity};
+use crate::grid::{DIMENSIONS, Grid};
+
+/// How a layer thinner than half a cell moves over a rough wall: it has no pressure of its own.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum ThinLayer {
+    /// As a depth-averaged layer: it is driven by the slope of its surface and its own weight, and
+    /// held by friction under the pressure of its weight.
+    #[default]
+    DepthAveraged,
+    /// It sticks.
+    Frozen,
+    /// It follows the nearest thicker material, and slides freely where there is none.
+    Following,
+}
+
+/// What a face does.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(crate) enum Face {
+    /// Its velocity is an unknown.
+    Own(usize),
+    /// It moves with an unknown of another face.
+    Follows(usize),
+    /// It stands still: a wall, or a layer stuck to one.
+    Still,
+    /// It flies freely, or there is no material near.
+    Loose,
+}
+
+impl Face {
+    /// The unknown that moves the face.
+    pub(crate) fn unknown(self) -> Option<usize> {
+        match self {
+            Face::Own(j) | Face::Follows(j) => Some(j),
+            Face::Still | Face::Loose => None,
+        }
+    }
+}
+
+/// Cells fuller than this are active.
+pub(crate) const ACTIVE: f64 = 0.5;
+/// Layers thinner than this part of a cell stick to a rough wall.
+const THINNEST_LAYER: f64 = 1e-3;
+
+/// Roles of cells and faces.
+#[derive(Debug, Clone, Default)]
+pub(crate) struct Faces {
+    /// Number of the unknown pressure of each cell, or [`NONE`].
+    pub pressure: Vec<usize>,
+    /// Cells with a pressure.
+    pub active: Vec<usize>,
+    /// Role of each face of each component.
+    pub role: [Vec<Face>; DIMENSIONS],
+    /// Component and face of each unknown velocity.
+    pub own: Vec<(usize, usize)>,
+    /// Whether an unknown velocity belongs to a thin layer on a wall.
+    pub is_thin: Vec<bool>,
+    acceleration: [f64; DIMENSIONS],
+}
+
+impl Faces {
+    pub(crate) fn of(
+        grid: &Grid,
+        topology: &Topology,
+        fractions: &[f64],
+        acceleration: [f64; DIMENSIONS],
+        thin_layer: ThinLayer,
+    ) -> Self {
+        let mut faces = Self {
+            acceleration,
+            pressure: vec![NONE; topology.cells()],
+            ..Self::default()
+        };
+        for (cell, &fraction) in fractions.iter().enumerate() {
+            if fraction > ACTIVE {
+                faces.pressure[cell] = faces.active.len();
+                faces.active.push(cell);
+            }
+        }
+        for component in 0..DIMENSIONS {
+            let role = (0..topology.faces(component))
+                .map(|face| faces.own_role(grid, topology, fractions, thin_layer, component, face))
+                .collect();
+            faces.role[component] = role;
+        }
+        for component in 0..DIMENSIONS {
+            for face in 0..topology.faces(component) {
+                if faces.role[component][face] == Face::Loose
+                    && let Some(host) = faces.host(topology, fractions, component, face)
+                {
+                    faces.role[component][face] = Face::Follows(host);
+                }
+            }
+        }
+        faces
+    }
+
+    /// The role of a face by itself; unknowns get their numbers.
+    fn own_role(
+        &mut self,
+        grid: &Grid,
+        topology: &Topology,
+        fractions: &[f64],
+        thin_layer: ThinLayer,
+        component: usize,
+        face: usize,
+    ) -> Face {
+        let cells = topology.face_cells[component][face];
+        if cells.contains(&NONE) {
+            return Face::Still;
+        }
+        let is_thin = cells.iter().all(|&cell| self.pressure[cell] == NONE);
+        if is_thin {
+            let mass = topology.face_mean(component, face, fractions);
+            if lies_on_wall(topology, fractions, component, face) {
+                return Face::Still;
+            }
+            let on_wall = self.wall_under(grid, topology, component, face).is_some();
+            if !on_wall || mass <= MASSLESS || thin_layer == ThinLayer::Following {
+                return Face::Loose;
+            }
+            if thin_layer == ThinLayer::Frozen || mass < THINNEST_LAYER {
+                return Face::Still;
+            }
+        }
+        self.own.push((component, face));
+        self.is_thin.push(is_thin);
+        Face::Own(self.own.len() - 1)
+    }
+
+    /// The unknown of the nearest face that has one, the direction into the material first.
+    fn host(
+        &self,
+        topology: &Topology,
+        fractions: &[f64],
+        component: usize,
+        face: usize,
+    ) -> Option<usize> {
+        let beside = topology.face_neighbours[component][face];
+        let mass = |at: usize| {
+            if at == NONE {
+                0.0
+            } else {
+                topology.face_mean(component, at, fractions)
+            }
+        };
+        let mut directions: [(f64, usize, usize); DIMENSIONS] = std::array::from_fn(|axis| {
+            let [low, high] = beside[axis].map(mass);
+            ((high - low).abs(), axis, usize::from(high >= low))
+        });
+        directions.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
+        let own = |at: usize| match at {
+            NONE => None,
+            at => match self.role[component][at] {
+                Face::Own(j) => Some(j),
+                _ => None,
+            },
+        };
+        let along = directions.iter().map(|&(_, axis, side)| beside[axis][side]);
+        let diagonal = directions
+            .iter()
+            .enumerate()
+            .flat_map(|(nth, &(_, axis, side))| {
+                let first = beside[axis][side];
+                directions[nth + 1..]
+                    .iter()
+                    .map(move |&(_, axis, side)| match first {
+                        NONE => NONE,
+                        first => topology.face_neighbours[component][first][axis][side],
+                    })
+            });
+        let against = directions
+            .iter()
+            .map(|&(_, axis, side)| beside[axis][1 - side]);
+        along.chain(diagonal).chain(against).find_map(own)
+    }
+
+    /// The axis and the side (0 low, 1 high) of a wall along a face that carries the weight of what
+    /// lies on it, if there is one.
+    pub(crate) fn wall_under(
+        &self,
+        grid: &Grid,
+        topology: &Topology,
+        component: usize,
+        face: usize,
+    ) -> Option<(usize, usize)> {
+        let other = (0..DIMENSIONS).filter(|&axis| axis != component);
+        other
+            .flat_map(|axis| [(axis, 0), (axis, 1)])
+            .find(|&(axis, side)| {
+                let ends = topology.face_neighbours[component][face][axis][side] == NONE;
+                let edge = [0, grid.axes()[axis].cells()][side];
+                let rigid = grid.axes()[axis]
+                    .boundary_at(edge)
+                    .is_some_and(|boundary| boundary.outer_pressure().is_none());
+                let along = self.acceleration[component].abs();
+                ends && rigid && weight_onto(&self.acceleration, axis, side) > along
+            })
+    }
+
+    /// Gives every face that follows the velocity of its unknown.
+    pub(crate) fn spread(&self, unknowns: &[f64], velocity: &mut Velocity) {
+        for (role, u) in self.role.iter().zip(velocity) {
+            for (role, u) in role.iter().zip(u) {
+                match role.unknown() {
+                    Some(j) => *u = unknowns[j],
+                    None if *role == Face::Still => *u = 0.0,
+                    None => {}
+                }
+            }
+        }
+    }
+}
+
+/// Whether a face lies above all material of the cell beside a wall, which cannot fall further.
+fn lies_on_wall(topology: &Topology, fractions: &[f64], component: usize, face: usize) -> bool {
+    (0..2).any(|side| {
+        let cell = topology.face_cells[component][face][side];
+        let other = topology.face_cells[component][face][1 - side];
+        topology.cell_neighbours[cell][component][side] == NONE && fractions[other] <= 0.0
+    })
+}
+
+/// Gravity normal to a wall on one side of an axis, positive towards the wall.
+pub(crate) fn weight_onto(acceleration: &[f64; DIMENSIONS], axis: usize, side: usize) -> f64 {
+    let towards = if side == 1 { 1.0 } else { -1.0 };
+    (towards * acceleration[axis]).max(0.0)
+}

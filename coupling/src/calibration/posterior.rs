@@ -1,0 +1,183 @@
+//! Samples of the posterior of (μ_s, μ_2, I_0), to be carried into predictions.
+//!
+//! Likelihood: Gauss' in μ with the effective variance σ² = σ_μ² + (∂μ/∂I)² σ_I² of each point, which depends on the
+//! parameters, all of it over the square of the fit's `error_scale` (layers of a run are not independent). Prior: flat
+//! in μ_s ≥ 0, μ_2 > μ_s and ln I_0, the last within a factor of 100 beyond the range of I of the data: what the data
+//! do not say stays bounded, and is seen to be only that. Sampled by Metropolis' random walk with steps from the
+//! fit's covariance, the random numbers seeded. Where the scale of the errors is known from ν degrees of freedom only,
+//! each sample is moved away from the median by √(ν/χ²), χ² drawn with ν degrees: Student's tails.
+
+use super::mu_i::{MuIFit, ONE_SIGMA, Stress, mu_of_i};
+use super::points::LocalPoint;
+use crate::steady_state::autocorrelation_time;
+use nalgebra::{Matrix3, Vector3};
+use rand::{Rng, RngExt, SeedableRng};
+use rand_chacha::ChaCha8Rng;
+use rand_distr::{ChiSquared, Distribution, StandardNormal};
+use serde::{Deserialize, Serialize};
+use statrs::distribution::{ContinuousCDF, StudentsT};
+
+/// Samples and what they say.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
+pub struct Posterior {
+    /// (μ_s, μ_2, I_0) of each sample.
+    pub samples: Vec<[f64; 3]>,
+    /// Quantiles 0.025, 0.16, 0.5, 0.84, 0.975 of each parameter.
+    pub quantiles: [[f64; 5]; 3],
+    /// Share of steps that were taken.
+    pub acceptance: f64,
+    /// Independent samples that the least mixed parameter's are worth.
+    pub effective_samples: f64,
+}
+
+/// Samples kept.
+const KEPT: usize = 1000;
+/// Steps between kept samples.
+const THINNING: usize = 15;
+/// Steps before the first.
+const BURN_IN: usize = 3000;
+/// How far I_0 may lie outside the data, as a factor.
+const BEYOND_DATA: f64 = 100.0;
+
+/// The law as the walk sees it: μ_s, μ_2 − μ_s and ln I_0.
+type Walker = Vector3<f64>;
+
+fn law(w: &Walker) -> [f64; 3] {
+    [w[0], w[0] + w[1], w[2].exp()]
+}
+
+/// Samples the posterior of a fit from the points it was made from; the same seed gives the same samples.
+pub fn sample_posterior(points: &[LocalPoint], fit: &MuIFit, seed: u64) -> Option<Posterior> {
+    if !fit.physical || points.is_empty() {
+        return None;
+    }
+    let friction = |p: &LocalPoint| match fit.stress {
+        Stress::MeanPressure => (p.friction, p.friction_error),
+        Stress::NormalPressure => (p.friction_zz, p.friction_zz_error),
+        Stress::TangentOfSlope => (p.slope_degrees.to_radians().tan(), p.friction_zz_error),
+    };
+    let student = fit.scale_freedom.and_then(|nu| {
+        Some((
+            nu,
+            StudentsT::new(0.0, 1.0, nu).ok()?.inverse_cdf(ONE_SIGMA),
+        ))
+    });
+    let narrowed = fit.error_scale / student.map_or(1.0, |(_, quantile)| quantile);
+    let temperature = narrowed * narrowed;
+    let limits = [
+        (fit.valid_i[0] / BEYOND_DATA).ln(),
+        (fit.valid_i[1] * BEYOND_DATA).ln(),
+    ];
+    let log_posterior = |w: &Walker| {
+        if w[0] < 0.0 || w[1] <= 0.0 || w[2] < limits[0] || w[2] > limits[1] {
+            return f64::NEG_INFINITY;
+        }
+        let [mu_s, mu_2, i_0] = law(w);
+        let mut sum = 0.0;
+        for p in points {
+            let (mu, error) = friction(p);
+            let i = p.inertial_number;
+            let lever = (mu_2 - mu_s) * i_0 / ((i + i_0) * (i + i_0)) * p.inertial_number_error;
+            let variance = error * error + lever * lever;
+            let miss = mu - mu_of_i(mu_s, mu_2, i_0, i);
+            sum -= 0.5 * (miss * miss / variance + variance.ln());
+        }
+        sum / temperature
+    };
+    // Covariance of (μ_s, Δμ, ln I_0) from that of (μ_s, μ_2, I_0).
+    let c = Matrix3::from_fn(|r, k| fit.covariance[r][k]);
+    let turn = Matrix3::new(1.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0, 0.0, 1.0 / fit.i_0);
+    let mut covariance = turn * c * turn.transpose();
+    // A parameter that is not known would send every step out of bounds.
+    let largest = Vector3::new(0.3, 0.5, 1.0);
+    for k in 0..3 {
+        let shrink = (largest[k] / covariance[(k, k)].sqrt()).min(1.0);
+        for other in 0..3 {
+            covariance[(k, other)] *= shrink;
+            covariance[(other, k)] *= shrink;
+        }
+        covariance[(k, k)] += 1e-12;
+    }
+    let stride = covariance.cholesky()?.l() * (2.38 / 3f64.sqrt());
+    let mut rng = ChaCha8Rng::seed_from_u64(seed);
+    let start = Vector3::new(
+        fit.mu_s,
+        fit.mu_2 - fit.mu_s,
+        fit.i_0.ln().clamp(limits[0], limits[1]),
+    );
+    let (mut here, mut height) = (start, log_posterior(&start));
+    let mut samples = Vec::with_capacity(KEPT);
+    let (mut taken, steps) = (0usize, BURN_IN + KEPT * THINNING);
+    for step in 0..steps {
+        let trial = here + stride * random_direction(&mut rng);
+        let value = log_posterior(&trial);
+        if rng.random_range(0.0..1.0f64).ln() < value - height {
+            (here, height) = (trial, value);
+            taken += 1;
+        }
+        if step >= BURN_IN && (step - BURN_IN) % THINNING == THINNING - 1 {
+            samples.push(here);
+        }
+    }
+    let acceptance = taken as f64 / steps as f64;
+    let effective = effective_samples(&samples);
+    if let Some(chi_square) = student.and_then(|(nu, _)| ChiSquared::new(nu).ok()) {
+        let nu = fit.scale_freedom.unwrap_or(1.0);
+        let centre = Walker::from_fn(|k, _| quantile(&samples, |w| w[k], 0.5));
+        for sample in &mut samples {
+            // Until it is where the prior is; a walk that never gets there stays.
+            for _ in 0..50 {
+                let widened =
+                    centre + (*sample - centre) * (nu / chi_square.sample(&mut rng)).sqrt();
+                if log_posterior(&widened) > f64::NEG_INFINITY {
+                    *sample = widened;
+                    break;
+                }
+            }
+        }
+    }
+    let samples: Vec<[f64; 3]> = samples.iter().map(law).collect();
+    Some(Posterior {
+        quantiles: std::array::from_fn(|k| QUANTILES.map(|q| quantile(&samples, |s| s[k], q))),
+        samples,
+        acceptance,
+        effective_samples: effective,
+    })
+}
+
+/// Probabilities of the quantiles told.
+const QUANTILES: [f64; 5] = [0.025, 0.16, 0.5, 0.84, 0.975];
+
+fn quantile<T>(samples: &[T], of: impl Fn(&T) -> f64, probability: f64) -> f64 {
+    let mut values: Vec<f64> = samples.iter().map(of).filter(|x| x.is_finite()).collect();
+    values.sort_by(f64::total_cmp);
+    let last = values.len().saturating_sub(1);
+    values
+        .get((last as f64 * probability).round() as usize)
+        .copied()
+        .unwrap_or(f64::NAN)
+}
+
+fn effective_samples(samples: &[Walker]) -> f64 {
+    let n = samples.len() as f64;
+    let of = |k: usize| {
+        let mean = samples.iter().map(|s| s[k]).sum::<f64>() / n;
+        let centred: Vec<f64> = samples.iter().map(|s| s[k] - mean).collect();
+        n / autocorrelation_time(&centred)
+    };
+    (0..3).map(of).fold(f64::INFINITY, f64::min)
+}
+
+fn random_direction(rng: &mut impl Rng) -> Vector3<f64> {
+    Vector3::from_fn(|_, _| rng.sample(StandardNormal))
+}
+
+impl Posterior {
+    /// Quantiles 0.025, 0.16, 0.5, 0.84 and 0.975 of anything that follows from the law (μ_s, μ_2, I_0); `None` where
+    /// no sample gives a number.
+    pub fn band(&self, of: impl Fn([f64; 3]) -> f64) -> Option<[f64; 5]> {
+        let values: Vec<f64> = self.samples.iter().map(|s| of(*s)).collect();
+        let band = QUANTILES.map(|q| quantile(&values, |x| *x, q));
+        band[0].is_finite().then_some(band)
+    }
+}

@@ -1,0 +1,52 @@
+//! The plan of a collapse.
+
+use super::Lines;
+use crate::run;
+use crate::scene::CollapseScene;
+
+pub(super) fn collapse(body: &CollapseScene) -> String {
+    let mut lines = Lines::default();
+    let case = run::collapse::case(body);
+    let units = case.units();
+    let spacing = body.grid.length_scaled * body.height / case.cells as f64;
+    let column = (body.height / spacing) * (case.width() / spacing);
+    lines.say(
+        "scene",
+        &format!(
+            "column-collapse: a column {} m high and {:.4} m wide beside a plane of symmetry, on a rough floor",
+            body.height,
+            case.width()
+        ),
+    );
+    lines.say_rheology(&body.rheology);
+    lines.say(
+        "grid",
+        &format!(
+            "{} square cells of {spacing:.4e} m along x; {column:.0} hold material, and only they cost",
+            case.cells
+        ),
+    );
+    lines.say("left out", &run::collapse::LEFT_OUT.join(", "));
+    for remark in body.rheology.remarks() {
+        lines.say("warning", &remark);
+    }
+    let largest = body.solver.largest_step_scaled * units.time();
+    // Fronts move at about √(g H) and at most twice that.
+    let step = (body.solver.courant * spacing / units.velocity).min(largest);
+    lines.say(
+        "time step",
+        &format!(
+            "about {step:.4e} s while the front moves at √(g H) = {:.3} m/s (courant {}), {largest:.4e} s at rest",
+            units.velocity, body.solver.courant
+        ),
+    );
+    let steps = body.duration_scaled * units.time() / step;
+    lines.say(
+        "cost",
+        &format!(
+            "at most {steps:.0} steps, {:.2e} cell-steps",
+            steps * column
+        ),
+    );
+    lines.0
+}

@@ -1,0 +1,109 @@
+//! What stands behind the law: competing laws, residuals, posterior, thresholds.
+
+use super::super::page::{figure, number, with_error};
+use super::super::plot::{Mark, Plot};
+use super::{Campaign, HEIGHT, WIDTH};
+use colluvium_coupling::campaign::Threshold;
+use maud::{Markup, html};
+
+/// Competing laws, the free table, residual tests, the posterior and where flow stops.
+pub(super) fn evidence(campaign: &Campaign) -> Markup {
+    let result = &campaign.result;
+    html! {
+        @if !result.alternatives.is_empty() {
+            h2 { "Other laws" }
+            p {
+                "The same points, errors and scatter for all. The criterion is Akaike's, corrected for few data and for scatter "
+                "beyond the stated errors; the weight is the support a law has among these."
+            }
+            div.wide { table {
+                tr { th.text { "law" } th.text { "parameters" } th { "rms" } th { "criterion" } th { "weight" } }
+                @for a in &result.alternatives {
+                    tr {
+                        td.text { (a.law.title()) }
+                        td.text {
+                            @for (k, name) in a.law.parameter_names().iter().enumerate() {
+                                @if k > 0 { ", " }
+                                (name) " = " (with_error(a.parameters[k], a.errors[k]))
+                            }
+                        }
+                        td { (number(a.rms_residual)) }
+                        td { (format!("{:.1}", a.criterion)) }
+                        td { (format!("{:.1} %", 100.0 * a.weight)) }
+                    }
+                }
+            } }
+        }
+        @if let Some(r) = &result.residuals {
+            h3 { "Are the residuals noise?" }
+            table {
+                tr { th.text { "question" } th { "probability" } }
+                tr { td.text { "χ² as large by chance, by the stated errors alone" } td { (number(r.chi_square)) } }
+                tr { td.text { "signs in the order of I change so seldom" } td { (number(r.signs)) } }
+                tr { td.text { "flows differ so much beyond their layers" } td { (number(r.between_runs)) } }
+                tr { td.text { "such a trend with depth at equal I" } td { (number(r.depth)) } }
+                tr { td.text { "that trend, from base to surface, in μ" } td { (with_error(r.depth_change, r.depth_change_error)) } }
+            }
+        }
+        div.figures {
+            @if let Some(table) = &result.free_form { (free_form(campaign, table)) }
+            @if let Some(p) = &result.posterior {
+                @let plane: Vec<(f64, f64)> = p.samples.iter().map(|s| (s[2], s[1])).collect();
+                @let plot = Plot::new("I_0", "μ_2").with("posterior samples", Mark::Dots, 0, plane);
+                (figure(&plot.svg(WIDTH, HEIGHT), &format!(
+                    "Posterior of the fit: {} samples, worth {:.0} independent ones. μ_s, 68 %: {:.3} to {:.3}.",
+                    p.samples.len(), p.effective_samples, p.quantiles[0][1], p.quantiles[0][3]
+                )))
+            }
+        }
+        @if result.stop.is_some() || result.onset.is_some() {
+            h3 { "Where half of the beds flow" }
+            table {
+                tr { th.text { "" } th { "depth [d]" } th { "slope" } th { "spread of beds" } th.text { "flowed of tried" } }
+                @for t in &result.stop_curve { (threshold("stop", t, campaign.diameter)) }
+                @if let Some(t) = &result.onset { (threshold("onset", t, campaign.diameter)) }
+            }
+        }
+    }
+}
+
+fn threshold(name: &str, t: &Threshold, diameter: f64) -> Markup {
+    let trials: Vec<String> = t
+        .trials
+        .iter()
+        .map(|t| format!("{:.2}°: {}/{}", t.slope_degrees, t.flowed, t.tried))
+        .collect();
+    html! {
+        tr {
+            td.text { (name) }
+            td { (format!("{:.1}", t.height / diameter)) }
+            td { (format!("{:.2} ± {:.2}°", t.degrees, t.error)) }
+            td { (format!("{:.1}°", t.spread)) }
+            td.text.wrap { (trials.join(", ")) }
+        }
+    }
+}
+
+fn free_form(campaign: &Campaign, table: &colluvium_coupling::calibration::FreeForm) -> Markup {
+    let points = &campaign.result.points;
+    let measured = points
+        .iter()
+        .map(|p| (p.inertial_number, p.friction))
+        .collect();
+    let knots = table
+        .inertial_number
+        .iter()
+        .copied()
+        .zip(table.friction.iter().copied())
+        .collect();
+    let plot = Plot::new("inertial number I", "friction μ = |τ|/p")
+        .with("points", Mark::Dots, 0, measured)
+        .with("table", Mark::Line, 1, knots);
+    figure(
+        &plot.svg(WIDTH, HEIGHT),
+        &format!(
+            "A table of no given form that only rises and bends downwards; rms {:.4}, {} constraints bind.",
+            table.rms_residual, table.binding
+        ),
+    )
+}

@@ -1,0 +1,368 @@
+//! The collapse of a column: from the scene to front and deposit.
+
+use super::bagnold::failure;
+use super::{Findings, Under};
+use crate::cost::Cost;
+use crate::failure::Failure;
+use crate::progress::Bar;
+use crate::scene::{CollapseScene, Scene, ThinLayerKind};
+use crate::state_hash;
+use crate::summary::{Model, Quantity, Summary};
+use crate::table::Table;
+use colluvium_continuum::column_collapse::{Collapse, CollapseCase, Front};
+use colluvium_continuum::free_surface::{SurfaceOptions, SurfaceState, SurfaceStep, ThinLayer};
+use colluvium_dem::Record;
+
+/// What the continuum leaves out.
+pub const LEFT_OUT: [&str; 5] = [
+    "grains",
+    "air",
+    "dilatancy (constant solid fraction)",
+    "the third dimension",
+    "non-local effects near the base",
+];
+/// Instants of the front over the duration.
+const FRONTS: f64 = 240.0;
+/// Instants of the profile over the duration.
+const PROFILES: f64 = 24.0;
+/// Steps at rest after which a run ends.
+const REST_STEPS: u64 = 3;
+
+/// The case that a scene describes.
+pub fn case(scene: &CollapseScene) -> CollapseCase {
+    CollapseCase {
+        aspect: scene.aspect,
+        height: scene.height,
+        gravity: scene.gravity,
+        rheology: scene.rheology.mu_i(),
+        cells: scene.cells(),
+        length_scaled: scene.grid.length_scaled,
+    }
+}
+
+/// The solver's settings that a scene describes.
+pub fn options(scene: &CollapseScene) -> SurfaceOptions {
+    let mut options = SurfaceOptions {
+        courant: scene.solver.courant,
+        largest_step: scene.solver.largest_step_scaled,
+        thin_layer: match scene.solver.thin_layer {
+            ThinLayerKind::DepthAveraged => ThinLayer::DepthAveraged,
+            ThinLayerKind::Frozen => ThinLayer::Frozen,
+            ThinLayerKind::Following => ThinLayer::Following,
+        },
+        ..SurfaceOptions::default()
+    };
+    options.solver.strain_rate_floor = scene.solver.strain_rate_floor;
+    options
+}
+
+/// Checks the case and the settings before anything is written.
+pub(super) fn check(scene: &Scene, body: &CollapseScene) -> Result<(), Failure> {
+    let named =
+        |error: colluvium_continuum::Error| Failure::Input(format!("{}: {error}", scene.origin));
+    case(body).validate().map_err(named)?;
+    options(body).validate().map_err(named)
+}
+
+/// What was found on the way, beside the state.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Course {
+    fronts: Vec<Front>,
+    /// Time, position and height, row by row.
+    profiles: [Vec<f64>; 3],
+    last: SurfaceStep,
+    /// Steps, Newton iterations, cuts, cell-steps and steps at rest.
+    counts: [u64; 5],
+    /// Largest residuals of momentum, divergence and stress of any step.
+    residuals: [f64; 3],
+}
+
+impl Course {
+    fn book(&mut self, step: &SurfaceStep, at_rest: bool) {
+        let [steps, iterations, cuts, cell_steps, resting] = &mut self.counts;
+        *steps += 1;
+        *iterations += step.newton_iterations as u64;
+        *cuts += step.cuts as u64;
+        *cell_steps += step.active_cells as u64;
+        *resting = if at_rest { *resting + 1 } else { 0 };
+        let r = &step.residuals;
+        for (most, now) in self
+            .residuals
+            .iter_mut()
+            .zip([r.momentum, r.divergence, r.stress])
+        {
+            *most = most.max(now);
+        }
+        self.last = *step;
+    }
+
+    fn see_front(&mut self, collapse: &Collapse, threshold: f64) {
+        self.fronts.push(collapse.front(threshold));
+    }
+
+    fn see_profile(&mut self, collapse: &Collapse) {
+        let (x, h) = collapse.profile();
+        let [times, positions, heights] = &mut self.profiles;
+        times.extend(std::iter::repeat_n(collapse.time(), x.len()));
+        positions.extend(x);
+        heights.extend(h);
+    }
+
+    fn record(&self, state: &SurfaceState) -> Record {
+        let mut record = Record::default();
+        let mut put = |name: &str, values: Vec<f64>| {
+            record.numbers.insert(name.to_owned(), values);
+        };
+        put("fractions", state.fractions.clone());
+        put("velocity/x", state.velocity[0].clone());
+        put("velocity/z", state.velocity[1].clone());
+        put("pressure", state.pressure.clone());
+        put("stress", state.stress.iter().flatten().copied().collect());
+        put(
+            "time",
+            vec![state.time, state.velocity_time, state.next_step],
+        );
+        let fronts = self.fronts.iter();
+        put(
+            "course/fronts",
+            fronts
+                .flat_map(|f| [f.time, f.position, f.height])
+                .collect(),
+        );
+        put("course/profiles", self.profiles.concat());
+        put("course/residuals", self.residuals.to_vec());
+        put("course/step", vec![self.last.dt, self.last.max_speed]);
+        record
+            .counts
+            .insert("steps".into(), vec![state.steps as u64]);
+        record
+            .counts
+            .insert("course/counts".into(), self.counts.to_vec());
+        record
+    }
+
+    fn restored(record: &Record) -> Option<(Course, SurfaceState)> {
+        let numbers = |name: &str| record.numbers.get(name).cloned();
+        let time = numbers("time")?;
+        let stress = numbers("stress")?;
+        let state = SurfaceState {
+            fractions: numbers("fractions")?,
+            velocity: [numbers("velocity/x")?, numbers("velocity/z")?],
+            pressure: numbers("pressure")?,
+            stress: stress.chunks_exact(2).map(|s| [s[0], s[1]]).collect(),
+            time: *time.first()?,
+            velocity_time: *time.get(1)?,
+            next_step: *time.get(2)?,
+            steps: *record.counts.get("steps")?.first()? as usize,
+        };
+        let fronts = numbers("course/fronts")?;
+        let profiles = numbers("course/profiles")?;
+        let rows = profiles.len() / 3;
+        let step = numbers("course/step")?;
+        let course = Course {
+            fronts: fronts
+                .chunks_exact(3)
+                .map(|f| Front {
+                    time: f[0],
+                    position: f[1],
+                    height: f[2],
+                })
+                .collect(),
+            profiles: [0, 1, 2].map(|n| profiles[n * rows..(n + 1) * rows].to_vec()),
+            last: SurfaceStep {
+                dt: *step.first()?,
+                max_speed: *step.get(1)?,
+                ..SurfaceStep::default()
+            },
+            counts: record
+                .counts
+                .get("course/counts")?
+                .clone()
+                .try_into()
+                .ok()?,
+            residuals: numbers("course/residuals")?.try_into().ok()?,
+        };
+        Some((course, state))
+    }
+}
+
+pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, Failure> {
+    let mut collapse = Collapse::new(&case(scene), &options(scene)).map_err(failure)?;
+    let unit = collapse.units().time();
+    let end = scene.duration_scaled * unit;
+    let threshold = scene.front_height_scaled * scene.height;
+    let mut course = Course::default();
+    if let Some(checkpoint) = &under.resumed {
+        let damaged =
+            || Failure::Input("--resume: the checkpoint misses a part; nothing was changed".into());
+        let (before, state) = Course::restored(&checkpoint.record).ok_or_else(damaged)?;
+        course = before;
+        collapse
+            .set_state(state)
+            .map_err(|error| Failure::Input(format!("--resume: {error}; nothing was changed")))?;
+    } else {
+        course.see_front(&collapse, threshold);
+        course.see_profile(&collapse);
+    }
+    under.begin()?;
+    let bar = Bar::new("column-collapse");
+    while collapse.time() < end * (1.0 - 1e-9) && course.counts[4] < REST_STEPS {
+        // Steps end at the instants of the tables, whenever a run was begun or resumed.
+        let next = (collapse.time() / end * FRONTS + 1e-6).floor() + 1.0;
+        let step = collapse
+            .step((next / FRONTS * end).min(end))
+            .map_err(failure)?;
+        course.book(&step, collapse.is_at_rest(&step));
+        if (collapse.time() / end * FRONTS - next).abs() < 1e-6 {
+            course.see_front(&collapse, threshold);
+            if (next * PROFILES / FRONTS).fract() < 1e-6 {
+                course.see_profile(&collapse);
+            }
+        }
+        bar.set(collapse.time() / end);
+        bar.say(&format!(
+            "{:.3} s, {:.3} m/s",
+            collapse.time(),
+            speed(&collapse, &step)
+        ));
+        under.checkpoint("flow", || course.record(collapse.flow().state()))?;
+    }
+    bar.clear();
+    let wall_s = under.wall_s();
+    course.see_front(&collapse, threshold);
+    let mut summary = Summary::begun("column-collapse", "run");
+    describe(&mut summary, scene, &collapse, &course, wall_s);
+    Ok(Findings {
+        summary,
+        tables: tables(&collapse, &course),
+        grains: None,
+    })
+}
+
+fn speed(collapse: &Collapse, step: &SurfaceStep) -> f64 {
+    step.max_speed * collapse.units().velocity
+}
+
+fn tables(collapse: &Collapse, course: &Course) -> Vec<Table> {
+    let (x, h) = collapse.profile();
+    let fronts = &course.fronts;
+    let [times, positions, heights] = &course.profiles;
+    vec![
+        Table::new("front")
+            .with("t", "s", fronts.iter().map(|f| f.time).collect())
+            .with("x_front", "m", fronts.iter().map(|f| f.position).collect())
+            .with("height", "m", fronts.iter().map(|f| f.height).collect()),
+        Table::new("deposit").with("x", "m", x).with("h", "m", h),
+        Table::new("profiles")
+            .with("t", "s", times.clone())
+            .with("x", "m", positions.clone())
+            .with("h", "m", heights.clone()),
+    ]
+}
+
+fn describe(
+    summary: &mut Summary,
+    scene: &CollapseScene,
+    collapse: &Collapse,
+    course: &Course,
+    wall_s: f64,
+) {
+    let case = case(scene);
+    let units = collapse.units();
+    let state = collapse.flow().state();
+    let [steps, iterations, cuts, cell_steps, resting] = course.counts;
+    summary.model = Model {
+        grains: 0,
+        cells: state.fractions.len() as u64,
+        dt_s: course.last.dt * units.time(),
+        dt_limit: "courant, with solver.largest_step_scaled".into(),
+        left_out: LEFT_OUT.map(String::from).to_vec(),
+    };
+    summary.cost = Cost::measured(wall_s, 1, 0, cell_steps);
+    summary.ledger.mass_relative = collapse.volume_drift();
+    summary.state_hash = state_hash::of(&[
+        &state.fractions,
+        &state.velocity[0],
+        &state.velocity[1],
+        &state.pressure,
+    ]);
+    summary.remarks.extend(scene.rheology.remarks());
+    let front = course.fronts.last().copied().unwrap_or_default();
+    let width = case.width();
+    let mut put = |name: &str, value: f64, unit: &str, source: &str| {
+        summary.put(name, Quantity::new(value, unit).from(source));
+    };
+    put(
+        "x_front",
+        front.position,
+        "m",
+        "where the heap is front_height_scaled high",
+    );
+    put(
+        "runout_scaled",
+        (front.position - width) / width,
+        "1",
+        "(x_front − width)/width",
+    );
+    put(
+        "deposit_height",
+        front.height,
+        "m",
+        "greatest height at the end",
+    );
+    put(
+        "time_of_rest",
+        if resting >= REST_STEPS {
+            collapse.time()
+        } else {
+            f64::NAN
+        },
+        "s",
+        "speeds below 5 ε height; null where the run ended before",
+    );
+    put(
+        "largest_speed",
+        speed(collapse, &course.last),
+        "m/s",
+        "at the end",
+    );
+    put("steps", steps as f64, "1", "");
+    put(
+        "newton_iterations",
+        iterations as f64,
+        "1",
+        "failed attempts included",
+    );
+    put("steps_cut", cuts as f64, "1", "halved and tried again");
+    let [momentum, divergence, stress] = course.residuals;
+    put(
+        "momentum_residual",
+        momentum,
+        "1",
+        "largest of any step, over gravity",
+    );
+    put(
+        "divergence_residual",
+        divergence,
+        "1",
+        "largest of any step, over √(gravity/height)",
+    );
+    put(
+        "stress_residual",
+        stress,
+        "1",
+        "largest of any step, relative",
+    );
+    put(
+        "strain_rate_floor",
+        scene.solver.strain_rate_floor / units.time(),
+        "1/s",
+        "at which rigid matter creeps",
+    );
+    let (x, _) = collapse.profile();
+    if front.position >= x.last().copied().unwrap_or(0.0) {
+        summary.remarks.push(
+            "The heap reached the end of the grid: grid.length_scaled is too small for its run-out.".into(),
+        );
+    }
+}

@@ -1,0 +1,146 @@
+//! Keys of the collapse of a column.
+
+use super::{FrictionLaw, RheologyKeys, SceneError};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A column that collapses on a rough floor.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CollapseScene {
+    /// What the material is made of.
+    pub model: CollapseModel,
+    /// Height over width of the column.
+    #[schemars(extend("minimum" = 0.05, "maximum" = 50.0))]
+    pub aspect: f64,
+    /// Height of the column (m).
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e5))]
+    pub height: f64,
+    /// Gravity (m/s²).
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
+    pub gravity: f64,
+    /// Longest time over √(height/gravity); the run ends before where everything rests.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e4))]
+    pub duration_scaled: f64,
+    /// Height over the column's at which the heap has its edge.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+    pub front_height_scaled: f64,
+    /// Size of the run: cells along each axis grow with it.
+    #[schemars(extend("minimum" = 0.1, "maximum" = 64.0))]
+    pub scale: f64,
+    /// The material.
+    pub rheology: RheologyKeys,
+    /// The grid.
+    pub grid: CollapseGrid,
+    /// The solver.
+    pub solver: CollapseSolver,
+}
+
+/// What the material is made of.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum CollapseModel {
+    /// A μ(I) continuum with a free surface.
+    Continuum,
+}
+
+/// The grid.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CollapseGrid {
+    /// Cells along x at scale 1; they are square.
+    #[schemars(extend("minimum" = 8, "maximum" = 8192))]
+    pub cells: u64,
+    /// Length of the grid over the height of the column.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
+    pub length_scaled: f64,
+}
+
+/// The solver.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CollapseSolver {
+    /// Largest Δt Σ|u|/h over the axes.
+    #[schemars(extend("minimum" = 0.001, "maximum" = 0.5))]
+    pub courant: f64,
+    /// Largest time step over √(height/gravity).
+    #[schemars(extend("minimum" = 1.0e-6, "maximum" = 10.0))]
+    pub largest_step_scaled: f64,
+    /// Strain rate over √(gravity/height) at which rigid matter creeps.
+    #[schemars(extend("minimum" = 1.0e-7, "maximum" = 0.1))]
+    pub strain_rate_floor: f64,
+    /// How layers thinner than half a cell move over the floor.
+    pub thin_layer: ThinLayerKind,
+}
+
+/// How layers thinner than half a cell move over the floor.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ThinLayerKind {
+    /// Driven by the slope of their surface, held by friction under their own weight.
+    DepthAveraged,
+    /// Not at all.
+    Frozen,
+    /// With the thicker material beside them.
+    Following,
+}
+
+/// Most cells that hold material at the start: their matrix has to fit into memory.
+const LARGEST_COLUMN: f64 = 200_000.0;
+
+impl CollapseScene {
+    /// Cells along x at this scale.
+    pub fn cells(&self) -> usize {
+        (self.grid.cells as f64 * self.scale).round().max(8.0) as usize
+    }
+
+    pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {
+        let refused = |key: &str, value: String, range: String| {
+            Err(SceneError::OutOfRange {
+                file: origin.to_owned(),
+                key: key.into(),
+                value,
+                range,
+            })
+        };
+        let per_height = self.cells() as f64 / self.grid.length_scaled;
+        let filled = per_height * per_height / self.aspect;
+        if filled > LARGEST_COLUMN {
+            return refused(
+                "grid.cells",
+                self.grid.cells.to_string(),
+                format!(
+                    "at most {LARGEST_COLUMN} cells in the column, here {filled:.0} at scale {}",
+                    self.scale
+                ),
+            );
+        }
+        let r = &self.rheology;
+        if let Some([low, high]) = r.valid_i.as_deref()
+            && low >= high
+        {
+            return refused(
+                "rheology.valid_i",
+                format!("[{low}, {high}]"),
+                "[low, high] with low < high".into(),
+            );
+        }
+        if r.law != FrictionLaw::MuI {
+            return refused(
+                "rheology.law",
+                r.law.word().into(),
+                "mu-i: columns collapse under this law alone".into(),
+            );
+        }
+        if let (Some(mu_s), Some(mu_2)) = (r.mu_s, r.mu_2)
+            && mu_2 < mu_s
+        {
+            return refused(
+                "rheology.mu_2",
+                mu_2.to_string(),
+                format!("at least rheology.mu_s = {mu_s}"),
+            );
+        }
+        Ok(())
+    }
+}

@@ -1,0 +1,106 @@
+//! The collapse of a column from the command line.
+
+#![allow(clippy::unwrap_used)] // a test may panic
+
+mod command;
+
+use command::{colluvium, succeed, summary, table, value};
+use std::process::{Command, Stdio};
+use std::time::{Duration, Instant};
+
+#[test]
+fn collapse_writes_front_and_deposit() {
+    let folder = tempfile::tempdir().unwrap();
+    let set = ["--set", "scale=0.375", "--set", "height=0.2"];
+    let run = [&["run", "column-collapse", "--out", "c"], &set[..]].concat();
+    succeed(folder.path(), &run);
+    let (header, fronts) = table(&folder.path().join("c/front.csv"));
+    assert_eq!(header, ["t", "x_front", "height"]);
+    let (header, deposit) = table(&folder.path().join("c/deposit.csv"));
+    assert_eq!(header, ["x", "h"]);
+    assert_eq!(deposit.len(), 48);
+    // All of the column, 0.2 m high and 0.4 m wide, lies in the deposit.
+    let spacing = deposit[1][0] - deposit[0][0];
+    let area: f64 = deposit.iter().map(|row| row[1] * spacing).sum();
+    assert!((area / 0.08 - 1.0).abs() < 1e-9, "{area}");
+    // It stands at first and does not run back.
+    assert!(fronts.len() > 100 && fronts[0][0] == 0.0);
+    // The edge of a grid of 48 cells is known to a cell and a half.
+    assert!((fronts[0][1] / 0.4 - 1.0).abs() < 0.08);
+    for pair in fronts.windows(2) {
+        assert!(pair[1][0] > pair[0][0] && pair[1][1] > pair[0][1] - 0.01);
+    }
+    let summary = summary(&folder.path().join("c"));
+    assert_eq!(summary["status"], "done");
+    let runout = value(&summary, "runout_scaled");
+    assert!((1.0..1.25).contains(&runout), "{runout}");
+    // In units of √(height/gravity) it takes 5 to 8.
+    let time = value(&summary, "time_of_rest") / (0.2_f64 / 9.81).sqrt();
+    assert!((5.0..8.0).contains(&time), "{time}");
+    assert!(summary["ledger"]["mass_relative"].as_f64().unwrap().abs() < 1e-12);
+    let report = std::fs::read_to_string(folder.path().join("c/report.html")).unwrap();
+    assert!(report.contains("Profiles through time"));
+}
+
+#[test]
+fn interrupted_collapse_goes_on_to_the_same_state() {
+    let folder = tempfile::tempdir().unwrap();
+    let arguments = |out: &'static str| {
+        let mut list = vec!["run", "column-collapse", "--out", out];
+        list.extend(["--set", "scale=0.5", "--set", "aspect=0.7"]);
+        list
+    };
+    succeed(folder.path(), &arguments("whole"));
+    let mut child = Command::new(env!("CARGO_BIN_EXE_colluvium"))
+        .args(arguments("parts"))
+        .current_dir(folder.path())
+        .stdout(Stdio::null())
+        .stderr(Stdio::null())
+        .spawn()
+        .unwrap();
+    let begun = || {
+        std::fs::read_to_string(folder.path().join("parts/log.txt"))
+            .is_ok_and(|log| log.contains("run column-collapse"))
+    };
+    let start = Instant::now();
+    while !begun() && start.elapsed() < Duration::from_secs(60) {
+        std::thread::sleep(Duration::from_millis(5));
+    }
+    std::thread::sleep(Duration::from_millis(50));
+    let id = child.id().to_string();
+    Command::new("kill").args(["-INT", &id]).status().unwrap();
+    assert_eq!(child.wait().unwrap().code(), Some(130));
+    let mut resume = arguments("parts");
+    resume.extend(["--resume", "--threads", "1"]);
+    succeed(folder.path(), &resume);
+    let hash = |out: &str| summary(&folder.path().join(out))["state_hash"].clone();
+    assert_eq!(hash("whole"), hash("parts"));
+    let text = |out: &str| std::fs::read_to_string(folder.path().join(out)).unwrap();
+    assert_eq!(text("whole/front.csv"), text("parts/front.csv"));
+    assert_eq!(text("whole/profiles.csv"), text("parts/profiles.csv"));
+}
+
+#[test]
+fn bad_collapses_are_refused_by_key() {
+    let folder = tempfile::tempdir().unwrap();
+    for (set, key, allowed) in [
+        ("model=\"gas\"", "model", "continuum"),
+        ("grid.length_scaled=1.5", "grid.length_scaled", "2"),
+        ("grid.cells=8", "grid.cells", "at least"),
+        ("solver.courant=0.7", "solver.courant", "0.5"),
+        ("rheology.mu_2=0.1", "rheology.mu_2", "0.32"),
+        ("aspect=0", "aspect", "0.05"),
+    ] {
+        let refused = colluvium(
+            folder.path(),
+            &["run", "column-collapse", "--out", "x", "--set", set],
+        );
+        assert_eq!(refused.status.code(), Some(2), "{set}");
+        let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert!(
+            message.contains(key) && message.contains(allowed),
+            "{set}: {message}"
+        );
+        assert!(!folder.path().join("x").exists());
+    }
+}
