@@ -186,10 +186,7 @@ fn wave_case<L: ShearLaw>(rheology: L, waves: usize, cells: usize) -> PlaneWaveC
 }
 
 /// (wavenumber, growth) of the waves that a grid resolves with four cells or more.
-fn dispersion<L: ShearLaw>(rheology: L, cells: usize) -> Outcome<Curve>
-where
-    L: Clone,
-{
+fn dispersion<L: ShearLaw + Clone>(rheology: L, cells: usize) -> Outcome<Curve> {
     (1..=cells / 4)
         .map(|waves| {
             let wave = wave_case(rheology.clone(), waves, cells).solve()?;

@@ -16,7 +16,7 @@ pub struct AngleOfReposeScene {
     #[schemars(extend("minimum" = 0.5, "maximum" = 50.0))]
     pub scale: f64,
     /// Magnitude of gravity (m/s²).
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
+    #[schemars(extend("minimum" = 1.0e-9, "maximum" = 1000.0))]
     pub gravity: f64,
     /// Seed of the bed.
     #[schemars(extend("minimum" = 0, "maximum" = 9007199254740991_i64))]

@@ -28,7 +28,7 @@ pub struct SiloScene {
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10000.0))]
     pub duration: f64,
     /// Magnitude of gravity (m/s²).
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
+    #[schemars(extend("minimum" = 1.0e-9, "maximum" = 1000.0))]
     pub gravity: f64,
     /// Seed of the fillings.
     #[schemars(extend("minimum" = 0, "maximum" = 9007199254740991_i64))]

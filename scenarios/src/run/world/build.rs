@@ -140,7 +140,7 @@ impl Stand {
         if steps > MOST_STEPS {
             return Err(Failure::Input(format!(
                 "{origin}: the run would take {steps:.3e} steps of {:.3e} s; allowed: at most {MOST_STEPS:e}: a shorter time, \
-                 larger parcels (coarse_graining) or softer grains",
+                 larger parcels (key `coarse_graining`) or softer grains (key `contact`)",
                 setup.timestep
             )));
         }
