@@ -20,7 +20,8 @@ use crate::reach::{Making, Reach};
 use crate::rows::Rows;
 use crate::setup::{Setup, SetupError, Threads};
 use crate::snapshot::GrainSample;
-use crate::sweep::{self, Moved, Pass, Sweep};
+use crate::sweep::{self, Pass, Sweep};
+use crate::team::OwnTeam;
 use crate::timestep::{self, Body, Classes, Conditions, Remedy, Shares};
 use crate::walls::{Age, Course, Scene, Span, Standing, Wall, WallContacts};
 use nalgebra::Vector3;
@@ -146,6 +147,7 @@ pub struct Simulation {
     pub(crate) walls: Vec<Standing>,
     pub(crate) timestep: f64,
     pub(crate) parallel: bool,
+    team: OwnTeam,
     /// Registers that steps use; all give the same bits.
     pub(crate) width: Width,
     pub(crate) skin: f64,
@@ -247,6 +249,7 @@ impl Simulation {
             walls: stand(setup.walls, setup.timestep),
             timestep: setup.timestep,
             parallel: setup.threads == Threads::Rayon,
+            team: OwnTeam::default(),
             width: Width::widest(),
             skin,
             grains: Grains::new(&setup.grains),
@@ -282,11 +285,13 @@ impl Simulation {
 
     /// Integrates `steps` steps.
     pub fn advance(&mut self, steps: u64) -> Result<(), Diverged> {
-        if self.parallel && rayon::current_thread_index().is_none() {
-            // From outside the pool every split of a step would be handed over: enter it once.
-            return rayon::scope(|_| self.advance_here(steps));
-        }
-        self.advance_here(steps)
+        let helpers = if self.parallel {
+            self.reach.chunks.len().min(rayon::current_num_threads()) - 1
+        } else {
+            0
+        };
+        let team = self.team.share();
+        team.with_helpers(helpers, || self.advance_here(steps))
     }
 
     fn advance_here(&mut self, steps: u64) -> Result<(), Diverged> {
@@ -378,6 +383,7 @@ impl Simulation {
         };
         self.springs_current = true;
         let lever = self.law.lever();
+        let team = self.team.share();
         let walls = if pass == Pass::Motion {
             0.0
         } else {
@@ -386,6 +392,8 @@ impl Simulation {
                 domain: &self.domain,
                 lever,
                 step,
+                threads: self.reach.chunks.len(),
+                team: &team,
             };
             self.wall_contacts.evaluate(law, &mut self.walls, &scene)
         };
@@ -394,16 +402,26 @@ impl Simulation {
         }
         let (g, images) = (self.gravity, Images::of(&self.cell()));
         let grains = &mut self.grains;
-        // SAFETY: a sweep writes the rows of each chunk on one thread, those of grains that other
-        // chunks read after all of them are through (`sweep.rs`).
-        let rows = unsafe { Rows::of(&mut grains.place, &mut grains.motion, &mut grains.turn) };
+        // SAFETY: a sweep moves the grains of each chunk, and writes what is theirs, on one thread; other
+        // chunks read copies, which are made before anything is moved (`sweep.rs`).
+        let rows = unsafe {
+            Rows::of(
+                &mut grains.place,
+                &mut grains.motion,
+                &mut grains.turn,
+                &mut self.fastest,
+                &mut self.taken,
+            )
+        };
         let sweep = Sweep {
             pass,
             width: self.width,
             parallel: self.parallel && self.reach.parallel,
+            team: &team,
             field: Field {
                 rows,
                 material: &grains.material,
+                dummy: grains.id.len() as u32,
                 images,
                 lever,
                 hold: self.hold,
@@ -420,12 +438,7 @@ impl Simulation {
             },
             fixed: &self.fixed,
         };
-        let moved = Moved {
-            first: [0; 2],
-            fastest: &mut self.fastest,
-            taken: &mut self.taken,
-        };
-        let pairs = sweep::run(law, &sweep, &mut self.reach.chunks, moved);
+        let pairs = sweep::run(law, &sweep, &mut self.reach.chunks);
         pairs.max(walls)
     }
 
@@ -474,7 +487,11 @@ impl Simulation {
             self.list_walls();
         }
         if self.reach.outdated(&self.list) {
-            self.make_reach(false);
+            if self.reach.is_uneven() {
+                self.deal_anew();
+            } else {
+                self.make_reach(false);
+            }
         }
         Ok(())
     }
@@ -607,13 +624,18 @@ impl Simulation {
         let (cell, listed) = (self.cell(), self.skin + self.hold);
         self.list
             .build(&mut self.grains, &cell, listed, self.parallel);
-        let list = &self.list;
+        let (list, team) = (&self.list, self.team.share());
         let place = |old: u32| match remaining(old) {
             GONE => GONE,
             old => list.new_index(old),
         };
-        self.touching
-            .collect(&mut self.reach, &mut self.grains, self.layout, &place);
+        self.touching.collect(
+            &mut self.reach,
+            &mut self.grains,
+            self.layout,
+            &team,
+            &place,
+        );
         self.wall_contacts.take_down(place);
         self.list_walls();
         self.settle_loads();
@@ -637,20 +659,39 @@ impl Simulation {
     /// Makes the list of pairs within reach anew: in new chunks, with the histories in `touching`, or
     /// in the same ones with the histories it has.
     fn make_reach(&mut self, cut: bool) {
+        let team = self.team.share();
+        if cut {
+            let grains = self.grains.len();
+            let ghosts = self.reach.cut(&self.list, grains, self.parallel, &team);
+            self.grains.lay_ghosts(ghosts);
+        }
+        for chunk in &self.reach.chunks {
+            self.grains.copy_ghosts(&chunk.ghosts, chunk.first_ghost);
+        }
         let making = Making {
             grains: &self.grains,
             list: &self.list,
             images: Images::of(&self.cell()),
+            team: &team,
+            lanes: self.width,
             width: self.layout.history,
             hold: self.hold,
         };
         if cut {
-            self.reach.cut(&making, &self.touching, self.parallel);
+            self.reach.deal(&making, &self.touching);
             self.touching.close(&mut self.grains.spare);
         } else {
             self.reach.renew(&making);
         }
         self.current = false;
+    }
+
+    /// Deals the grains out to threads anew.
+    fn deal_anew(&mut self) {
+        let (reach, grains, team) = (&mut self.reach, &mut self.grains, self.team.share());
+        self.touching
+            .collect(reach, grains, self.layout, &team, &|i| i);
+        self.make_reach(true);
     }
 
     /// Takes up histories of touching contacts i < j, as a checkpoint has them.
@@ -794,9 +835,7 @@ impl Simulation {
         if parallel != self.parallel {
             self.parallel = parallel;
             self.forget_observation();
-            let (reach, grains) = (&mut self.reach, &mut self.grains);
-            self.touching.collect(reach, grains, self.layout, &|i| i);
-            self.make_reach(true);
+            self.deal_anew();
         }
     }
 }
