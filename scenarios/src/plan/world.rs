@@ -262,6 +262,7 @@ fn measured_rate(materials: &Materials, stand: &Stand) -> Result<f64, Failure> {
         })
         .collect();
     setup.walls.clear();
+    setup.bodies.clear();
     setup.gravity = Vector3::zeros();
     setup.domain = Domain {
         periodic: [false; 3],

@@ -144,7 +144,7 @@ impl SiloScene {
 }
 
 /// A flat ring in the plane z = 0: a floor with a round hole with a sharp rim.
-fn ring(axis: f64, inner: f64, outer: f64) -> Result<Wall, Failure> {
+fn ring(axis: f64, inner: f64, outer: f64) -> Result<Wall, String> {
     let corner = |radius: f64, k: usize| {
         let (s, c) = (TAU * k as f64 / EDGES as f64).sin_cos();
         Vector3::new(axis + radius * c, radius * s, 0.0)
@@ -158,8 +158,9 @@ fn ring(axis: f64, inner: f64, outer: f64) -> Result<Wall, Failure> {
         })
         .collect();
     let mesh = Mesh::new(vertices.collect(), &triangles);
-    let mesh = mesh.map_err(|error| Failure::Run(format!("floor with an opening: {error}")))?;
-    Ok(Wall::mesh(Arc::new(mesh)))
+    Ok(Wall::mesh(Arc::new(
+        mesh.map_err(|error| error.to_string())?,
+    )))
 }
 
 impl Recipe for SiloScene {
@@ -255,7 +256,12 @@ impl Recipe for SiloScene {
         let mut walls = self.tubes(materials, material);
         for (k, v) in self.vessels(materials).iter().enumerate() {
             // Beyond the tube, so that no corner is open.
-            let floor = ring(v.axis, 0.5 * v.opening, v.radius + 0.4 * ROOM * d)?;
+            let floor = ring(v.axis, 0.5 * v.opening, v.radius + 0.4 * ROOM * d);
+            let floor = floor.map_err(|error| {
+                Failure::Input(format!(
+                    "{origin}: key `openings_diameters`: grains of {d} m leave no floor with such an opening: {error}"
+                ))
+            })?;
             walls.push((format!("floor_{}", k + 1), floor.material(material)));
         }
         let below = -CATCH * d;
