@@ -541,11 +541,12 @@ pub(crate) fn filled(pairs: usize) -> usize {
     pairs.next_multiple_of(WIDEST)
 }
 
-/// Empties a list that is to take so many; a little more, since the next time there may be.
+/// Empties a list that is to take so many, and more, since grains are dealt out anew: what is not written takes no
+/// memory, but a list that grows leaves a hole as large as it was.
 fn clear_for<T>(values: &mut Vec<T>, count: usize) {
     values.clear();
     if values.capacity() < count {
-        values.reserve_exact(count + count / 16);
+        values.reserve_exact(count + count / 4);
     }
 }
 
