@@ -137,12 +137,12 @@ fn check(python: &Path, path: &Path, frames: &[vtkhdf::Frame]) {
             .split(' ')
             .map(|x| x.parse().unwrap())
             .collect();
-        let cells = frame.points.len()
-            / if frame.cells == vtkhdf::Cells::Lines {
-                2
-            } else {
-                1
-            };
+        let points_each = match frame.cells {
+            vtkhdf::Cells::Points => 1,
+            vtkhdf::Cells::Lines => 2,
+            vtkhdf::Cells::Quadrilaterals => 4,
+        };
+        let cells = frame.points.len() / points_each;
         let sum: f64 = frame.points.iter().flatten().sum();
         let close = |a: f64, b: f64| (a - b).abs() <= 1e-9 * (1.0 + b.abs());
         assert_eq!(
