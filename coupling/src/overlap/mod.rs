@@ -1,0 +1,468 @@
+//! Grains on one side of an edge, continuum on the other, and an overlap in which they exchange their states.
+//!
+//! From the grains outwards: *inner overlap* from a to the handshake surface m, *buffer* from m to the edge b,
+//! where the grains end. Grains have their full mass, weight and contacts everywhere; the continuum keeps a copy of
+//! full mass from a to b. Totals count grains inside m and continuum outside. What is exchanged:
+//!
+//! - *stresses*: faces of the copy bear w σ_grains + (1 − w) σ_continuum, with w from 1 at a to 0 at m, and
+//!   σ_grains coarse-grained (contact and kinetic) and averaged exponentially ([`Averages`]);
+//! - *traction*: the outermost grains bear the continuum's stress on the edge, whose normal part yields to
+//!   waves as an impedance does ([`Shell`]);
+//! - *velocity*: in the buffer, mean velocities relax to each other, equal and opposite, and mean spins to half
+//!   the vorticity, whose couple the continuum takes as an antisymmetric stress; in the inner overlap the copy
+//!   follows the grains;
+//! - *mass*: the continuum is what the total has beyond the grains' own masses.
+//!
+//! Grains make explicit steps inside one implicit step of the continuum. Forces are never blended: that has no
+//! unique split of stress between the two.
+//!
+//! # What it cannot do
+//! The continuum has no granular temperature: over a rough base it must not stand under flowing grains. One
+//! edge, flat and normal to an axis, is joined to one column ([`FlatEdge`]); what acts on grains goes by the
+//! questions of [`Edge`] alone.
+
+mod averages;
+mod edge;
+mod far_side;
+mod ledger;
+mod monitors;
+mod record;
+mod settings;
+mod shell;
+mod strip;
+
+pub use averages::{Averages, FaceStress, Node};
+pub use edge::{Edge, FlatEdge};
+pub use far_side::FarSide;
+pub use ledger::Ledger;
+pub use monitors::{Monitors, Report};
+pub use settings::{NormalMotion, OverlapSettings, Resolved, Scales, StressKernel};
+pub use shell::{Given, Held, Shell, Work};
+pub use strip::Strip;
+
+use averages::Sight;
+use colluvium_continuum::grid::Boundary;
+use colluvium_continuum::rheology::ShearLaw;
+use colluvium_dem::{Diverged, SetupError, Simulation, Snapshot};
+use settings::check;
+
+/// Why an overlap cannot be made or go on.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum OverlapError {
+    /// A number is out of range.
+    #[error("overlap.{key} = {value}: must be {allowed}")]
+    OutOfRange {
+        /// Name of the key.
+        key: &'static str,
+        /// The value found.
+        value: f64,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// The grains refuse a load.
+    #[error(transparent)]
+    Setup(#[from] SetupError),
+    /// The grains flew apart.
+    #[error(transparent)]
+    Diverged(#[from] Diverged),
+    /// The continuum's step failed.
+    #[error("continuum of the overlap: {0}")]
+    Continuum(#[from] colluvium_continuum::Error),
+    /// A checkpoint does not belong to this overlap.
+    #[error("checkpoint: {0}")]
+    Record(String),
+}
+
+/// What an overlap is made from.
+#[derive(Clone, Debug)]
+pub struct OverlapSpec<L> {
+    /// Where grains end.
+    pub edge: FlatEdge,
+    /// Material of the continuum.
+    pub rheology: L,
+    /// What holds at its far end.
+    pub far_end: Boundary,
+    /// What defaults are formed from.
+    pub scales: Scales,
+    /// Settings.
+    pub settings: OverlapSettings,
+    /// Strain-rate floor of the continuum's yield step, in √(g/H).
+    pub strain_rate_floor: f64,
+}
+
+/// Grains and continuum joined at one edge. The grains are the caller's: every call needs the same simulation.
+pub struct Overlap<L> {
+    settings: Resolved,
+    edge: FlatEdge,
+    strip: Strip,
+    continuum: FarSide<L>,
+    averages: Averages,
+    shell: Shell,
+    held: Held,
+    given: Given,
+    monitors: Monitors,
+    ledger: Ledger,
+    /// Steps of the grains in one of the continuum, and those made since the last exchange.
+    steps: u64,
+    made: u64,
+    /// Velocity of the continuum along n (m/s).
+    normal_velocity: f64,
+    /// Mass of the continuum beyond the edge (kg).
+    mass_beyond: f64,
+    /// Mass of the free grains (kg).
+    grain_mass: f64,
+    snapshot: Snapshot,
+}
+
+/// Step by which the continuum finds its stress before the first exchange, as a fraction of an exchange: too
+/// short to change a velocity.
+const PRIMING: f64 = 1e-6;
+
+impl<L: ShearLaw> Overlap<L> {
+    /// Hands all grains beyond the edge over to the continuum: their mass becomes its mass, and its velocity is
+    /// theirs, layer by layer.
+    ///
+    /// # Errors
+    /// Settings out of range, or nothing beyond the edge.
+    pub fn replace(
+        spec: OverlapSpec<L>,
+        simulation: &mut Simulation,
+    ) -> Result<Self, OverlapError> {
+        let settings = spec.settings.resolve(&spec.scales)?;
+        let edge = spec.edge;
+        let mut snapshot = Snapshot::default();
+        simulation.snapshot(&mut snapshot);
+        let beyond = |x: &nalgebra::Vector3<f64>| edge.distance(x) > 0.0;
+        let leaves = snapshot.grains.iter().filter(|g| !g.fixed && beyond(&g.position));
+        let mass_beyond: f64 = leaves.map(|g| g.mass).sum();
+        let depth = mass_beyond / (spec.rheology.bulk_density() * edge.area());
+        check(
+            "edge.position",
+            edge.position,
+            depth >= settings.cell,
+            "where grains of at least one cell's depth lie beyond it",
+        )?;
+        let cells_beyond = (depth / settings.cell).round().max(1.0);
+        let strip = Strip::new(&settings, depth / cells_beyond);
+        check(
+            "shell",
+            settings.shell,
+            strip.shell <= (strip.buffer as f64 + 1e-9) * strip.cell,
+            "at most the buffer's width in whole cells",
+        )?;
+        let mut continuum = FarSide::new(
+            &edge,
+            &strip,
+            cells_beyond as usize,
+            &simulation.gravity(),
+            spec.far_end,
+            (spec.rheology, spec.strain_rate_floor),
+        )?;
+        let profile = averages::velocity_profile(
+            &snapshot.grains,
+            &edge,
+            strip.face(0),
+            strip.cell,
+            continuum.cells(),
+        );
+        for (k, velocity) in profile.into_iter().enumerate() {
+            continuum.set_velocity(k, velocity);
+        }
+        let mut averages = Averages::new(&strip, settings.kernel);
+        // Stresses as they are while all grains are still there.
+        let sight = Sight {
+            snapshot: &snapshot,
+            edge: &edge,
+            strip: &strip,
+            continuum: continuum.velocities(),
+        };
+        averages.sample(&sight, 1.0);
+        let normal_velocity = match settings.normal_motion {
+            NormalMotion::Held => 0.0,
+            NormalMotion::Riding => {
+                averages::normal_velocity(&snapshot.grains, &edge, strip.face(0))
+            }
+        };
+        simulation.remove(|g| !g.fixed && beyond(&g.position));
+        let nodes = strip.nodes();
+        let steps = (settings.exchange_time / simulation.timestep()).round().max(1.0) as u64;
+        let mut overlap = Self {
+            settings,
+            edge,
+            strip,
+            continuum,
+            averages,
+            shell: Shell::default(),
+            held: Held {
+                accelerations: vec![0.0; nodes],
+                spins: vec![0.0; nodes],
+                ..Held::default()
+            },
+            given: Given {
+                relaxation: vec![0.0; nodes],
+                spin: vec![0.0; nodes],
+                ..Given::default()
+            },
+            monitors: Monitors::default(),
+            ledger: Ledger::default(),
+            steps,
+            made: 0,
+            normal_velocity,
+            mass_beyond,
+            grain_mass: simulation.free_mass(),
+            snapshot,
+        };
+        let tiny = PRIMING * overlap.exchange_time(simulation);
+        overlap.step_continuum(tiny)?;
+        overlap.open(simulation);
+        overlap.agree(simulation);
+        Ok(overlap)
+    }
+
+    /// Opens the ledger with what there is now.
+    fn open(&mut self, simulation: &mut Simulation) {
+        self.ledger = Ledger {
+            mass_before: self.grain_mass + self.mass_beyond,
+            grains_before: self.grain_momentum(simulation),
+            continuum_before: self.continuum_momentum(),
+            ..Ledger::default()
+        };
+    }
+
+    fn exchange_time(&self, simulation: &Simulation) -> f64 {
+        self.steps as f64 * simulation.timestep()
+    }
+
+    /// Advances grains and continuum by so many steps of the grains.
+    ///
+    /// # Errors
+    /// If the grains fly apart or the continuum's step fails.
+    pub fn advance(&mut self, simulation: &mut Simulation, steps: u64) -> Result<(), OverlapError> {
+        for _ in 0..steps {
+            self.step_grains(simulation)?;
+            self.made += 1;
+            if self.made == self.steps {
+                self.exchange(simulation)?;
+                self.made = 0;
+            }
+        }
+        Ok(())
+    }
+
+    /// One step of the grains under what is held.
+    fn step_grains(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
+        let impedance = self.settings.impedance;
+        let kick = simulation.next_kick();
+        let before = self.given.impedance;
+        self.shell.lay(
+            simulation,
+            (&self.edge, &self.strip),
+            (impedance, self.normal_velocity),
+            &self.held,
+            &mut self.given,
+        )?;
+        let gravity = simulation.gravity();
+        let n = self.edge.normal(&gravity);
+        self.ledger.weight[0] += kick * self.grain_mass * gravity[self.edge.flow_axis];
+        self.ledger.weight[1] += kick * self.grain_mass * gravity.dot(&n);
+        simulation.advance(1)?;
+        if self.settings.normal_motion == NormalMotion::Riding {
+            let taken = before - self.given.impedance;
+            self.normal_velocity += taken / self.mass_beyond;
+            self.ledger.riding += taken;
+            self.edge.shift(self.normal_velocity * simulation.timestep());
+        }
+        Ok(())
+    }
+
+    /// Averages of the grains to the continuum, its step, and what it does to the grains until the next exchange.
+    fn exchange(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
+        let dt = self.exchange_time(simulation);
+        simulation.snapshot(&mut self.snapshot);
+        self.sample(dt / self.settings.stress_time);
+        self.step_continuum(dt)?;
+        self.book(dt);
+        self.follow(dt);
+        // The slips that the next exchange acts on are those against the continuum as it now is.
+        self.sample(0.0);
+        self.agree(simulation);
+        let area = self.edge.area();
+        let relaxation: f64 = self.given.relaxation.iter().sum();
+        self.monitors.take(
+            &self.averages,
+            &self.continuum,
+            (&self.strip, area),
+            [relaxation, self.given.shear],
+            self.shell.beyond,
+        );
+        self.given.relaxation.fill(0.0);
+        self.given.spin.fill(0.0);
+        let given = &mut self.given;
+        (given.shear, given.pressure, given.impedance, given.time) = (0.0, 0.0, 0.0, 0.0);
+        Ok(())
+    }
+
+    fn sample(&mut self, lapse: f64) {
+        let sight = Sight {
+            snapshot: &self.snapshot,
+            edge: &self.edge,
+            strip: &self.strip,
+            continuum: self.continuum.velocities(),
+        };
+        self.averages.sample(&sight, lapse);
+    }
+
+    fn step_continuum(&mut self, dt: f64) -> Result<(), OverlapError> {
+        let (faces, given, strip) = (&self.averages.faces, &self.given, &self.strip);
+        let area = self.edge.area();
+        self.continuum.step(
+            dt,
+            |f| faces[f].shear,
+            |k| (couple(given, strip, k) - given.relaxation[k]) / area,
+            faces[0].pressure,
+        )?;
+        Ok(())
+    }
+
+    /// Books what the grains' kicks and the continuum's step have done.
+    fn book(&mut self, dt: f64) {
+        let (area, gravity) = (self.edge.area(), self.snapshot.gravity);
+        let (ledger, given) = (&mut self.ledger, &self.given);
+        ledger.shear += given.shear;
+        ledger.pressure += given.pressure;
+        ledger.impedance += given.impedance;
+        ledger.relaxation += given.relaxation.iter().sum::<f64>();
+        ledger.spin += given.spin.iter().sum::<f64>();
+        let cells = self.continuum.cells();
+        let mass = area * self.continuum.cell_mass() * cells as f64;
+        ledger.continuum_weight += dt * mass * gravity[self.edge.flow_axis];
+        ledger.inner_stress -= dt * area * self.averages.faces[0].shear;
+        ledger.far_stress += dt * area * self.continuum.shear_stress(cells);
+    }
+
+    /// The copy in the inner overlap follows the grains.
+    fn follow(&mut self, dt: f64) {
+        let part = (dt / self.settings.following_time).min(1.0);
+        let mass = self.edge.area() * self.continuum.cell_mass();
+        for k in 0..self.strip.inner {
+            let change = -part * self.averages.nodes[k].slip();
+            let velocity = self.continuum.velocities()[k];
+            self.continuum.set_velocity(k, velocity + change);
+            self.ledger.following += mass * change;
+        }
+    }
+
+    /// Takes the continuum's traction, and forms the accelerations that bring mean velocities and spins together.
+    fn agree(&mut self, simulation: &Simulation) {
+        let dt = self.exchange_time(simulation);
+        let edge_face = self.strip.nodes();
+        self.held.shear = self.continuum.shear_stress(edge_face);
+        self.held.pressure = self.continuum.pressure(edge_face);
+        let towards = |time: f64| (dt / time).min(1.0) / dt;
+        let (rate, turn) = (
+            towards(self.settings.relaxation_time),
+            towards(self.settings.spin_time),
+        );
+        let velocities = self.continuum.velocities();
+        for k in self.strip.inner..self.strip.nodes() {
+            let node = &self.averages.nodes[k];
+            self.held.accelerations[k] = rate * node.slip();
+            // (∇ × u)·(n × t) = ∂u/∂n, by central difference of the cells beside.
+            let vorticity = (velocities[k + 1] - velocities[k - 1]) / (2.0 * self.strip.cell);
+            self.held.spins[k] = turn * (0.5 * vorticity - node.mean_spin());
+        }
+    }
+
+    /// Momentum of the grains along the flow and outwards, with what walls have taken (N s).
+    fn grain_momentum(&self, simulation: &mut Simulation) -> [f64; 2] {
+        let momentum = simulation.leapfrog_momentum() + simulation.wall_impulse();
+        let n = self.edge.normal(&momentum);
+        [momentum[self.edge.flow_axis], momentum.dot(&n)]
+    }
+
+    /// Momentum of the continuum along the flow, copy included (N s).
+    fn continuum_momentum(&self) -> f64 {
+        let mass = self.edge.area() * self.continuum.cell_mass();
+        mass * self.continuum.velocities().iter().sum::<f64>()
+    }
+
+    /// Settings in use.
+    pub fn settings(&self) -> &Resolved {
+        &self.settings
+    }
+
+    /// The edge as it is now.
+    pub fn edge(&self) -> &FlatEdge {
+        &self.edge
+    }
+
+    /// Faces and nodes.
+    pub fn strip(&self) -> &Strip {
+        &self.strip
+    }
+
+    /// The continuum.
+    pub fn continuum(&self) -> &FarSide<L> {
+        &self.continuum
+    }
+
+    /// Averages of the grains.
+    pub fn averages(&self) -> &Averages {
+        &self.averages
+    }
+
+    /// What acts on the grains until the next exchange.
+    pub fn held(&self) -> &Held {
+        &self.held
+    }
+
+    /// Work of what acts on the grains since the start (J).
+    pub fn work(&self) -> Work {
+        self.shell.work
+    }
+
+    /// Velocity of the continuum along n (m/s).
+    pub fn normal_velocity(&self) -> f64 {
+        self.normal_velocity
+    }
+
+    /// Accounts since the start.
+    pub fn ledger(&self) -> &Ledger {
+        &self.ledger
+    }
+
+    /// Starts the monitors anew.
+    pub fn watch(&mut self) {
+        self.monitors = Monitors::default();
+    }
+
+    /// What the monitors say.
+    pub fn report(&self) -> Report {
+        self.monitors.report()
+    }
+
+    /// Relative errors of the ledger: mass, momentum of the grains, momentum of the continuum. Valid right after
+    /// an exchange ([`at_exchange`](Self::at_exchange)).
+    pub fn ledger_errors(&self, simulation: &mut Simulation) -> [f64; 3] {
+        let mass = simulation.free_mass() + self.mass_beyond;
+        [
+            (mass / self.ledger.mass_before - 1.0).abs(),
+            self.ledger.grains_error(self.grain_momentum(simulation)),
+            self.ledger.continuum_error(self.continuum_momentum()),
+        ]
+    }
+
+    /// Whether an exchange has just been made.
+    pub fn at_exchange(&self) -> bool {
+        self.made == 0
+    }
+}
+
+/// Impulse (N s) into a cell along the flow of the couples that turned the grains' spins: the continuum takes the
+/// opposite couple per volume c as a force ½ ∇ × c, which is −½ ∂c/∂n along t and has no sum.
+fn couple(given: &Given, strip: &Strip, cell: usize) -> f64 {
+    let of = |k: usize| given.spin.get(k).copied().unwrap_or(0.0);
+    let below = if cell > 0 { of(cell - 1) } else { 0.0 };
+    // c = −spin impulse / volume; faces have the mean of the cells beside them.
+    0.5 * (0.5 * (of(cell) + of(cell + 1)) - 0.5 * (below + of(cell))) / strip.cell
+}
