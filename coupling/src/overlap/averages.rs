@@ -1,6 +1,6 @@
 //! What the continuum gets to know of the grains: stresses on its faces, mean velocities and spins at its nodes.
 
-use super::edge::Edge;
+use super::edge::ZoneEdge;
 use super::settings::StressKernel;
 use super::strip::{Shares, Strip, interpolate};
 use crate::coarse_graining::{Kernel, Layers, Lucy};
@@ -99,7 +99,7 @@ impl Averages {
 
     /// Takes in one instant: nodes as they are, stresses with the weight 1 − exp(−Δt/t) against those before,
     /// where `lapse` is Δt/t.
-    pub fn sample<E: Edge>(&mut self, sight: &Sight<'_, E>, lapse: f64) {
+    pub fn sample<E: ZoneEdge>(&mut self, sight: &Sight<'_, E>, lapse: f64) {
         self.sum_nodes(sight);
         self.instant.fill(FaceStress::default());
         match self.kernel {
@@ -114,7 +114,7 @@ impl Averages {
         self.started = true;
     }
 
-    fn sum_nodes<E: Edge>(&mut self, sight: &Sight<'_, E>) {
+    fn sum_nodes<E: ZoneEdge>(&mut self, sight: &Sight<'_, E>) {
         let strip = sight.strip;
         self.nodes.fill(Node::default());
         for (grain, s, shares) in inside(sight) {
@@ -147,7 +147,7 @@ impl Averages {
 
     /// σ = (1/V) [Σ f ⊗ a ∫W − Σ m v′ ⊗ v′ W] in layers of a cell around each face; the line between two centres
     /// bears the force of their contact.
-    fn sum_stresses<E: Edge, K: Kernel>(&mut self, sight: &Sight<'_, E>, kernel: &K) {
+    fn sum_stresses<E: ZoneEdge, K: Kernel>(&mut self, sight: &Sight<'_, E>, kernel: &K) {
         let (strip, snapshot) = (sight.strip, sight.snapshot);
         let volume = sight.edge.area() * strip.cell;
         let lowest = strip.face(0) - 0.5 * strip.cell - kernel.reach();
@@ -223,7 +223,7 @@ impl Averages {
 }
 
 /// Free grains that belong to any node, with their places and shares.
-fn inside<'a, E: Edge>(
+fn inside<'a, E: ZoneEdge>(
     sight: &'a Sight<'_, E>,
 ) -> impl Iterator<Item = (&'a GrainSample, f64, Shares)> {
     let free = sight.snapshot.grains.iter().filter(|g| !g.fixed);
@@ -236,7 +236,7 @@ fn inside<'a, E: Edge>(
 
 /// Mean velocities of grains along the flow in cells of height `cell` from the place `first` (a face) outwards;
 /// cells without grains have those of the one before.
-pub fn velocity_profile<E: Edge>(
+pub fn velocity_profile<E: ZoneEdge>(
     grains: &[GrainSample],
     edge: &E,
     first: f64,
@@ -264,7 +264,7 @@ pub fn velocity_profile<E: Edge>(
 }
 
 /// Mean velocity of grains normal to the edge beyond a place (m/s).
-pub fn normal_velocity<E: Edge>(grains: &[GrainSample], edge: &E, beyond: f64) -> f64 {
+pub fn normal_velocity<E: ZoneEdge>(grains: &[GrainSample], edge: &E, beyond: f64) -> f64 {
     let beyond = |g: &&GrainSample| !g.fixed && edge.distance(&g.position) > beyond;
     let sums = grains.iter().filter(beyond).fold([0.0; 2], |[m, p], g| {
         let n: Vector3<f64> = edge.normal(&g.position);

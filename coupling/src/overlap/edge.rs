@@ -6,7 +6,7 @@ use nalgebra::Vector3;
 /// The edge b of a zone of grains, cut into patches, each with a column of continuum on its other side.
 ///
 /// Everything else in this folder asks the geometry these questions only.
-pub trait Edge {
+pub trait ZoneEdge {
     /// Distance of a point from the edge (m), positive outwards, where there are no grains.
     fn distance(&self, x: &Vector3<f64>) -> f64;
     /// Outward normal at a point.
@@ -60,7 +60,7 @@ impl FlatEdge {
     }
 }
 
-impl Edge for FlatEdge {
+impl ZoneEdge for FlatEdge {
     fn distance(&self, x: &Vector3<f64>) -> f64 {
         self.sign() * (x[self.axis] - self.position)
     }

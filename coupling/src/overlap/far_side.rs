@@ -21,7 +21,8 @@ pub struct FarSide<L> {
 }
 
 impl<L: ShearLaw> FarSide<L> {
-    /// The column of `beyond` cells beyond the edge and a copy of those of the strip.
+    /// The column of `beyond` cells beyond the edge and a copy of those of the strip, whose faces bear the grains'
+    /// stress by `shares`.
     pub fn new(
         edge: &FlatEdge,
         strip: &Strip,
@@ -29,6 +30,7 @@ impl<L: ShearLaw> FarSide<L> {
         gravity: &Vector3<f64>,
         far_end: Boundary,
         law: (L, f64),
+        shares: impl Fn(usize) -> f64,
     ) -> Result<Self, Error> {
         let cells = strip.nodes() + beyond;
         let reversed = !edge.grains_below;
@@ -58,7 +60,7 @@ impl<L: ShearLaw> FarSide<L> {
         };
         let mut column = case.begin()?;
         let mut shares: Vec<f64> = (0..=cells)
-            .map(|f| if f < strip.inner { strip.share(f) } else { 0.0 })
+            .map(|f| if f < strip.nodes() { shares(f) } else { 0.0 })
             .collect();
         if reversed {
             shares.reverse();
@@ -145,7 +147,7 @@ impl<L: ShearLaw> FarSide<L> {
     }
 
     /// Advances by `dt` with the grains' shear stress on the faces of the copy, impulses per area into its cells
-    /// and the grains' pressure at a.
+    /// and the one beyond, and the grains' pressure at a.
     pub fn step(
         &mut self,
         dt: f64,
@@ -157,7 +159,8 @@ impl<L: ShearLaw> FarSide<L> {
             let at = self.face(f);
             self.given[at] = self.sign() * shear(f);
         }
-        for k in 0..self.copied {
+        // The couple of the outermost node reaches half into the cell beyond the edge.
+        for k in 0..=self.copied {
             let at = self.cell(k);
             self.impulses[at] = impulse(k);
         }

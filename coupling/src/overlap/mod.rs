@@ -14,25 +14,28 @@
 //! - *mass*: the continuum is what the total has beyond the grains' own masses.
 //!
 //! Grains make explicit steps inside one implicit step of the continuum. Forces are never blended: that has no
-//! unique split of stress between the two.
+//! unique split of stress between the two
+//! ([`force_blending`]).
 //!
 //! # What it cannot do
 //! The continuum has no granular temperature: over a rough base it must not stand under flowing grains. One
 //! edge, flat and normal to an axis, is joined to one column ([`FlatEdge`]); what acts on grains goes by the
-//! questions of [`Edge`] alone.
+//! questions of [`ZoneEdge`] alone.
 
 mod averages;
 mod edge;
 mod far_side;
+pub mod force_blending;
 mod ledger;
 mod monitors;
 mod record;
 mod settings;
 mod shell;
+mod start;
 mod strip;
 
 pub use averages::{Averages, FaceStress, Node};
-pub use edge::{Edge, FlatEdge};
+pub use edge::{ZoneEdge, FlatEdge};
 pub use far_side::FarSide;
 pub use ledger::Ledger;
 pub use monitors::{Monitors, Report};
@@ -44,7 +47,7 @@ use averages::Sight;
 use colluvium_continuum::grid::Boundary;
 use colluvium_continuum::rheology::ShearLaw;
 use colluvium_dem::{Diverged, SetupError, Simulation, Snapshot};
-use settings::check;
+use start::Start;
 
 /// Why an overlap cannot be made or go on.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -114,10 +117,6 @@ pub struct Overlap<L> {
     snapshot: Snapshot,
 }
 
-/// Step by which the continuum finds its stress before the first exchange, as a fraction of an exchange: too
-/// short to change a velocity.
-const PRIMING: f64 = 1e-6;
-
 impl<L: ShearLaw> Overlap<L> {
     /// Hands all grains beyond the edge over to the continuum: their mass becomes its mass, and its velocity is
     /// theirs, layer by layer.
@@ -128,46 +127,14 @@ impl<L: ShearLaw> Overlap<L> {
         spec: OverlapSpec<L>,
         simulation: &mut Simulation,
     ) -> Result<Self, OverlapError> {
-        let settings = spec.settings.resolve(&spec.scales)?;
-        let edge = spec.edge;
-        let mut snapshot = Snapshot::default();
-        simulation.snapshot(&mut snapshot);
-        let beyond = |x: &nalgebra::Vector3<f64>| edge.distance(x) > 0.0;
-        let leaves = snapshot.grains.iter().filter(|g| !g.fixed && beyond(&g.position));
-        let mass_beyond: f64 = leaves.map(|g| g.mass).sum();
-        let depth = mass_beyond / (spec.rheology.bulk_density() * edge.area());
-        check(
-            "edge.position",
-            edge.position,
-            depth >= settings.cell,
-            "where grains of at least one cell's depth lie beyond it",
-        )?;
-        let cells_beyond = (depth / settings.cell).round().max(1.0);
-        let strip = Strip::new(&settings, depth / cells_beyond);
-        check(
-            "shell",
-            settings.shell,
-            strip.shell <= (strip.buffer as f64 + 1e-9) * strip.cell,
-            "at most the buffer's width in whole cells",
-        )?;
-        let mut continuum = FarSide::new(
-            &edge,
-            &strip,
-            cells_beyond as usize,
-            &simulation.gravity(),
-            spec.far_end,
-            (spec.rheology, spec.strain_rate_floor),
-        )?;
-        let profile = averages::velocity_profile(
-            &snapshot.grains,
-            &edge,
-            strip.face(0),
-            strip.cell,
-            continuum.cells(),
-        );
-        for (k, velocity) in profile.into_iter().enumerate() {
-            continuum.set_velocity(k, velocity);
-        }
+        let Start {
+            settings,
+            edge,
+            strip,
+            continuum,
+            mass_beyond,
+            snapshot,
+        } = Start::of(spec, simulation, |strip, f| strip.share(f))?;
         let mut averages = Averages::new(&strip, settings.kernel);
         // Stresses as they are while all grains are still there.
         let sight = Sight {
@@ -183,7 +150,7 @@ impl<L: ShearLaw> Overlap<L> {
                 averages::normal_velocity(&snapshot.grains, &edge, strip.face(0))
             }
         };
-        simulation.remove(|g| !g.fixed && beyond(&g.position));
+        simulation.remove(|g| !g.fixed && edge.distance(&g.position) > 0.0);
         let nodes = strip.nodes();
         let steps = (settings.exchange_time / simulation.timestep()).round().max(1.0) as u64;
         let mut overlap = Self {
@@ -212,11 +179,20 @@ impl<L: ShearLaw> Overlap<L> {
             grain_mass: simulation.free_mass(),
             snapshot,
         };
-        let tiny = PRIMING * overlap.exchange_time(simulation);
-        overlap.step_continuum(tiny)?;
+        overlap.prime(overlap.exchange_time(simulation))?;
         overlap.open(simulation);
         overlap.agree(simulation);
         Ok(overlap)
+    }
+
+    /// A step of the continuum that is taken back but for its stress and pressure, for grains to meet at once.
+    fn prime(&mut self, dt: f64) -> Result<(), OverlapError> {
+        let velocities = self.continuum.velocities().to_vec();
+        self.step_continuum(dt)?;
+        for (k, velocity) in velocities.into_iter().enumerate() {
+            self.continuum.set_velocity(k, velocity);
+        }
+        Ok(())
     }
 
     /// Opens the ledger with what there is now.
@@ -318,7 +294,10 @@ impl<L: ShearLaw> Overlap<L> {
         self.continuum.step(
             dt,
             |f| faces[f].shear,
-            |k| (couple(given, strip, k) - given.relaxation[k]) / area,
+            |k| {
+                let relaxation = given.relaxation.get(k).copied().unwrap_or(0.0);
+                (couple(given, strip, k) - relaxation) / area
+            },
             faces[0].pressure,
         )?;
         Ok(())

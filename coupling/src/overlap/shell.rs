@@ -11,7 +11,7 @@
 //! On a grain of the buffer, F = m Σ_k h_k a_k and, about n × t, M = I Σ_k h_k α_k: accelerations of nodes, which
 //! shift mean velocities and spins and leave those of single grains about the mean alone.
 
-use super::edge::Edge;
+use super::edge::ZoneEdge;
 use super::strip::Strip;
 use colluvium_dem::{Load, SetupError, Simulation};
 use nalgebra::Vector3;
@@ -88,7 +88,7 @@ struct Weighed {
 
 impl Shell {
     /// Lays the loads of the next step. Returns v̄ (m/s), or nothing where the shell is empty.
-    pub fn lay<E: Edge>(
+    pub fn lay<E: ZoneEdge>(
         &mut self,
         simulation: &mut Simulation,
         (edge, strip): (&E, &Strip),
@@ -147,7 +147,7 @@ impl Shell {
     }
 
     /// Weighs the shell, and books the second half of the last kick's work.
-    fn weigh<E: Edge>(&mut self, simulation: &Simulation, edge: &E, strip: &Strip) -> Weighed {
+    fn weigh<E: ZoneEdge>(&mut self, simulation: &Simulation, edge: &E, strip: &Strip) -> Weighed {
         let mut shell = Weighed {
             weight: 0.0,
             velocity: 0.0,
