@@ -183,8 +183,8 @@ impl Simulation {
         }
     }
 
-    /// Puts steady loads on grains, in place of those there were; they act from now on. Once as many have
-    /// been put on before, nothing is allocated.
+    /// Puts steady loads on grains, in place of those there were; they act from now on. Nothing is allocated as
+    /// long as their number does not double.
     ///
     /// On a fixed grain a load does nothing. Removing a grain drops its load.
     ///
@@ -211,6 +211,11 @@ impl Simulation {
         }
         self.forget_observation();
         self.loads.given.clear();
+        if self.loads.given.capacity() < loads.len() {
+            // Where loads change every step their number does too.
+            self.loads.given.reserve(2 * loads.len());
+            self.loads.places.reserve(2 * loads.len());
+        }
         self.loads.given.extend_from_slice(loads);
         self.loads.settle(&self.places);
         Ok(())

@@ -106,7 +106,11 @@ impl Averages {
             StressKernel::Layer => self.sum_stresses(sight, &Layers),
             StressKernel::Lucy(half_width) => self.sum_stresses(sight, &Lucy { half_width }),
         }
-        let weight = if self.started { -(-lapse).exp_m1() } else { 1.0 };
+        let weight = if self.started {
+            -(-lapse).exp_m1()
+        } else {
+            1.0
+        };
         for (mean, now) in self.faces.iter_mut().zip(&self.instant) {
             mean.shear += weight * (now.shear - mean.shear);
             mean.pressure += weight * (now.pressure - mean.pressure);
@@ -118,7 +122,10 @@ impl Averages {
         let strip = sight.strip;
         self.nodes.fill(Node::default());
         for (grain, s, shares) in inside(sight) {
-            let (n, t) = (sight.edge.normal(&grain.position), sight.edge.tangent(&grain.position));
+            let (n, t) = (
+                sight.edge.normal(&grain.position),
+                sight.edge.tangent(&grain.position),
+            );
             let velocity = grain.velocity.dot(&t);
             let continuum = interpolate(sight.continuum, strip.node(0), strip.cell, s);
             let inertia = 0.4 * grain.mass * grain.radius * grain.radius;
@@ -159,9 +166,11 @@ impl Averages {
             };
             // What is held in place is wall: its half of the line is not material.
             let (start, force, branch) = match (grain.fixed, other) {
-                (false, Some(_)) => {
-                    (&grain.position, contact.force, contact.arm - contact.partner_arm)
-                }
+                (false, Some(_)) => (
+                    &grain.position,
+                    contact.force,
+                    contact.arm - contact.partner_arm,
+                ),
                 (false, None) => (&grain.position, contact.force, contact.arm),
                 (true, Some(other)) => (&other.position, -contact.force, contact.partner_arm),
                 (true, None) => continue,
@@ -183,7 +192,10 @@ impl Averages {
             if s < lowest {
                 continue;
             }
-            let (n, t) = (sight.edge.normal(&grain.position), sight.edge.tangent(&grain.position));
+            let (n, t) = (
+                sight.edge.normal(&grain.position),
+                sight.edge.tangent(&grain.position),
+            );
             let mean = interpolate(&self.velocities, strip.node(0), strip.cell, s);
             let across = grain.velocity.dot(&n);
             let along = grain.velocity.dot(&t) - mean;

@@ -36,11 +36,7 @@ impl<L: ShearLaw> FarSide<L> {
         let reversed = !edge.grains_below;
         // The inner end is loaded by the grains' stress alone; where the far end does not set the pressure, it
         // does.
-        let sets_pressure = matches!(
-            far_end,
-            Boundary::FreeSurface | Boundary::LoadedWall { .. }
-        );
-        let inner_end = if sets_pressure {
+        let inner_end = if sets_pressure(&far_end) {
             Boundary::FreeSlip
         } else {
             Boundary::FreeSurface
@@ -169,7 +165,8 @@ impl<L: ShearLaw> FarSide<L> {
         } else {
             [pressure, 0.0]
         };
-        self.column.step(dt, &self.given, &self.impulses, pressures)?;
+        self.column
+            .step(dt, &self.given, &self.impulses, pressures)?;
         self.read_velocities();
         Ok(())
     }
@@ -185,4 +182,9 @@ impl<L: ShearLaw> FarSide<L> {
         self.read_velocities();
         Ok(())
     }
+}
+
+/// Whether a far end gives way along the normal.
+pub(super) fn sets_pressure(far_end: &Boundary) -> bool {
+    matches!(far_end, Boundary::FreeSurface | Boundary::LoadedWall { .. })
 }

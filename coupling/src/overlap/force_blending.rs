@@ -15,7 +15,7 @@
 //! Wriggers, *Comput. Methods Appl. Mech. Eng.* 205–208 (2012) 46 for the weighting of energies.
 
 use super::averages::{Averages, Sight};
-use super::edge::{ZoneEdge, FlatEdge};
+use super::edge::{FlatEdge, ZoneEdge};
 use super::far_side::FarSide;
 use super::settings::Resolved;
 use super::start::Start;

@@ -73,8 +73,24 @@ impl Ledger {
 
     /// From such numbers.
     pub fn from_numbers(n: &[f64]) -> Result<Self, String> {
-        let &[mass_before, g0, g1, w0, w1, shear, pressure, impedance, relaxation, spin, continuum_before, continuum_weight, inner_stress, far_stress, following, riding] =
-            n
+        let &[
+            mass_before,
+            g0,
+            g1,
+            w0,
+            w1,
+            shear,
+            pressure,
+            impedance,
+            relaxation,
+            spin,
+            continuum_before,
+            continuum_weight,
+            inner_stress,
+            far_stress,
+            following,
+            riding,
+        ] = n
         else {
             return Err(format!(
                 "{} numbers of a ledger instead of {}",

@@ -35,7 +35,7 @@ mod start;
 mod strip;
 
 pub use averages::{Averages, FaceStress, Node};
-pub use edge::{ZoneEdge, FlatEdge};
+pub use edge::{FlatEdge, ZoneEdge};
 pub use far_side::FarSide;
 pub use ledger::Ledger;
 pub use monitors::{Monitors, Report};
@@ -152,14 +152,16 @@ impl<L: ShearLaw> Overlap<L> {
         };
         simulation.remove(|g| !g.fixed && edge.distance(&g.position) > 0.0);
         let nodes = strip.nodes();
-        let steps = (settings.exchange_time / simulation.timestep()).round().max(1.0) as u64;
+        let steps = (settings.exchange_time / simulation.timestep())
+            .round()
+            .max(1.0) as u64;
         let mut overlap = Self {
             settings,
             edge,
             strip,
             continuum,
             averages,
-            shell: Shell::default(),
+            shell: Shell::new(simulation.grain_count()),
             held: Held {
                 accelerations: vec![0.0; nodes],
                 spins: vec![0.0; nodes],
@@ -246,7 +248,8 @@ impl<L: ShearLaw> Overlap<L> {
             let taken = before - self.given.impedance;
             self.normal_velocity += taken / self.mass_beyond;
             self.ledger.riding += taken;
-            self.edge.shift(self.normal_velocity * simulation.timestep());
+            self.edge
+                .shift(self.normal_velocity * simulation.timestep());
         }
         Ok(())
     }

@@ -70,7 +70,10 @@ impl Monitors {
             sums[0] += grains;
             sums[1] += continuum;
         }
-        for (part, nodes) in [&averages.nodes[..m], &averages.nodes[m..]].into_iter().enumerate() {
+        for (part, nodes) in [&averages.nodes[..m], &averages.nodes[m..]]
+            .into_iter()
+            .enumerate()
+        {
             let mass: f64 = nodes.iter().map(|node| node.mass).sum();
             let fluctuation: f64 = nodes.iter().map(|node| node.fluctuation).sum();
             self.density[part] += mass / (area * strip.cell * nodes.len() as f64);
@@ -116,7 +119,22 @@ impl Monitors {
 
     /// From such numbers.
     pub fn from_numbers(n: &[f64]) -> Result<Self, String> {
-        let &[count, slip, velocity, a, b, c, d, e, f, g, h, escaped, relaxation, interface] = n
+        let &[
+            count,
+            slip,
+            velocity,
+            a,
+            b,
+            c,
+            d,
+            e,
+            f,
+            g,
+            h,
+            escaped,
+            relaxation,
+            interface,
+        ] = n
         else {
             return Err(format!("{} numbers of monitors instead of 14", n.len()));
         };

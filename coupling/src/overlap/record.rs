@@ -12,7 +12,11 @@ impl<L: ShearLaw> Overlap<L> {
         let mut numbers = |name: &str, values: Vec<f64>| {
             record.numbers.insert(name.into(), values);
         };
-        let faces = self.averages.faces.iter().flat_map(|f| [f.shear, f.pressure]);
+        let faces = self
+            .averages
+            .faces
+            .iter()
+            .flat_map(|f| [f.shear, f.pressure]);
         numbers("faces", faces.collect());
         let (flow, time) = self.continuum.state();
         numbers("continuum/u", flow.u.clone());
@@ -66,7 +70,9 @@ impl<L: ShearLaw> Overlap<L> {
                 Ok(values)
             } else {
                 let found = values.len();
-                Err(format!("array `{name}` has {found} numbers, expected {len} finite ones"))
+                Err(format!(
+                    "array `{name}` has {found} numbers, expected {len} finite ones"
+                ))
             }
         };
         let faces = sized("faces", 2 * (nodes + 1))?.as_chunks::<2>().0;
@@ -81,9 +87,13 @@ impl<L: ShearLaw> Overlap<L> {
             s: record.numbers("continuum/s")?.as_chunks::<2>().0.to_vec(),
         };
         self.continuum.take_up(flow, state[0])?;
-        self.held.accelerations.copy_from_slice(sized("held/accelerations", nodes)?);
+        self.held
+            .accelerations
+            .copy_from_slice(sized("held/accelerations", nodes)?);
         self.held.spins.copy_from_slice(sized("held/spins", nodes)?);
-        self.given.relaxation.copy_from_slice(sized("given/relaxation", nodes)?);
+        self.given
+            .relaxation
+            .copy_from_slice(sized("given/relaxation", nodes)?);
         self.given.spin.copy_from_slice(sized("given/spin", nodes)?);
         self.edge.position = state[1];
         self.normal_velocity = state[2];

@@ -16,11 +16,14 @@ pub enum StressKernel {
 }
 
 /// What the continuum does along the normal of the edge.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+///
+/// In a steady flow whose full version breathes (swings along the normal by the waves between base and surface),
+/// a continuum that is held absorbs the swing with all that goes through the impedance; one that rides gives most
+/// of it back, as the column it stands for would.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
 pub enum NormalMotion {
     /// It keeps its place: it stands on a rigid base, or what goes through the impedance is absorbed.
-    #[default]
     Held,
     /// It rides on the grains as a rigid body of the mass beyond the edge, and the edge moves with it: what goes
     /// through the impedance is its momentum.
@@ -53,8 +56,8 @@ pub struct OverlapSettings {
     pub exchange_time: Option<f64>,
     /// Acoustic impedance Z of the edge (Pa s/m): [`Scales::impedance`].
     pub impedance: Option<f64>,
-    /// Motion of the continuum along the normal.
-    pub normal_motion: NormalMotion,
+    /// Motion of the continuum along the normal: riding where its far end is free, held where it is not.
+    pub normal_motion: Option<NormalMotion>,
 }
 
 /// What the defaults are formed from (SI).
@@ -110,11 +113,11 @@ pub struct Resolved {
 }
 
 impl OverlapSettings {
-    /// Fills in what is left out and checks the rest.
+    /// Fills in what is left out, for a continuum whose far end is free or not, and checks the rest.
     ///
     /// # Errors
     /// The first number out of range, by name.
-    pub fn resolve(&self, scales: &Scales) -> Result<Resolved, OverlapError> {
+    pub fn resolve(&self, scales: &Scales, free: bool) -> Result<Resolved, OverlapError> {
         for (key, value) in [
             ("diameter", scales.diameter),
             ("time", scales.time),
@@ -136,7 +139,11 @@ impl OverlapSettings {
             spin_time: self.spin_time.unwrap_or(t),
             exchange_time: self.exchange_time.unwrap_or(0.04 * t),
             impedance: self.impedance.unwrap_or(scales.impedance()),
-            normal_motion: self.normal_motion,
+            normal_motion: self.normal_motion.unwrap_or(if free {
+                NormalMotion::Riding
+            } else {
+                NormalMotion::Held
+            }),
         };
         let r = &resolved;
         for (key, value) in [

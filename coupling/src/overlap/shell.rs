@@ -87,6 +87,14 @@ struct Weighed {
 }
 
 impl Shell {
+    /// For a number of grains that does not grow: nothing is allocated later.
+    pub fn new(grains: usize) -> Self {
+        Self {
+            loads: Vec::with_capacity(grains),
+            ..Self::default()
+        }
+    }
+
     /// Lays the loads of the next step. Returns v̄ (m/s), or nothing where the shell is empty.
     pub fn lay<E: ZoneEdge>(
         &mut self,
@@ -109,7 +117,8 @@ impl Shell {
                 continue;
             }
             let (n, t) = (edge.normal(&grain.position), edge.tangent(&grain.position));
-            let share = strip.traction_weight(grain.mass, s) * area / shell.weight.max(f64::MIN_POSITIVE);
+            let share =
+                strip.traction_weight(grain.mass, s) * area / shell.weight.max(f64::MIN_POSITIVE);
             let (mut rate, mut turn) = (0.0, 0.0);
             let inertia = 0.4 * grain.mass * grain.radius * grain.radius;
             for (k, h) in strip.shares(s) {
@@ -137,7 +146,8 @@ impl Shell {
                 force: pull.traction + pull.impedance + pull.relaxation,
                 moment: pull.moment,
             });
-            self.work.add(&pull, (&grain.velocity, &grain.spin), 0.5 * kick);
+            self.work
+                .add(&pull, (&grain.velocity, &grain.spin), 0.5 * kick);
             self.pulls[grain.id as usize] = pull;
         }
         given.time += kick;

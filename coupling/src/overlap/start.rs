@@ -1,8 +1,8 @@
 //! What all couplings at an edge begin with: the grains beyond it become the continuum.
 
 use super::averages::velocity_profile;
-use super::edge::{ZoneEdge, FlatEdge};
-use super::far_side::FarSide;
+use super::edge::{FlatEdge, ZoneEdge};
+use super::far_side::{FarSide, sets_pressure};
 use super::settings::{Resolved, check};
 use super::strip::Strip;
 use super::{OverlapError, OverlapSpec};
@@ -28,7 +28,9 @@ impl<L: ShearLaw> Start<L> {
         simulation: &mut Simulation,
         share: impl Fn(&Strip, usize) -> f64,
     ) -> Result<Self, OverlapError> {
-        let settings = spec.settings.resolve(&spec.scales)?;
+        let settings = spec
+            .settings
+            .resolve(&spec.scales, sets_pressure(&spec.far_end))?;
         let edge = spec.edge;
         let mut snapshot = Snapshot::default();
         simulation.snapshot(&mut snapshot);

@@ -111,7 +111,10 @@ mod tests {
     fn places_lie_where_they_should() {
         assert_eq!((STRIP.face(0), STRIP.face(7)), (-3.5, 0.0));
         assert_eq!(STRIP.handshake(), -2.0);
-        assert_eq!((STRIP.share(0), STRIP.share(3), STRIP.share(6)), (1.0, 0.0, 0.0));
+        assert_eq!(
+            (STRIP.share(0), STRIP.share(3), STRIP.share(6)),
+            (1.0, 0.0, 0.0)
+        );
         assert!((STRIP.share(1) - 2.0 / 3.0).abs() < 1e-15);
         assert_eq!(STRIP.traction_weight(2.0, -1.5), 0.0);
         assert_eq!(STRIP.traction_weight(2.0, -0.5), 1.0);

@@ -100,6 +100,33 @@ impl std::fmt::Display for Errors {
     }
 }
 
+/// The mean of several runs over the same window.
+pub fn mean(profiles: &[Profile]) -> Profile {
+    let mut mean = profiles[0].clone();
+    for row in &mut mean.rows {
+        let same = profiles
+            .iter()
+            .filter_map(|p| p.rows.iter().find(|o| (o.z - row.z).abs() < 1e-9));
+        let same: Vec<&ProfileRow> = same.collect();
+        let over = |value: fn(&ProfileRow) -> f64| {
+            same.iter().map(|r| value(r)).sum::<f64>() / same.len() as f64
+        };
+        let values = [
+            over(|r| r.u.value),
+            over(|r| r.sigma_zz.value),
+            over(|r| r.tau.value),
+            over(|r| r.phi.value),
+            over(|r| r.temperature.value),
+        ];
+        row.u.value = values[0];
+        row.sigma_zz.value = values[1];
+        row.tau.value = values[2];
+        row.phi.value = values[3];
+        row.temperature.value = values[4];
+    }
+    mean
+}
+
 /// Largest relative error of the continuum's velocities against the full profile, at heights between two.
 pub fn continuum_error(
     velocities: impl Iterator<Item = (f64, f64)>,

