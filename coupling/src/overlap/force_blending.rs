@@ -46,7 +46,7 @@ pub struct ForceBlending<L> {
     made: u64,
 }
 
-impl<L: ShearLaw> ForceBlending<L> {
+impl<L: ShearLaw + Copy> ForceBlending<L> {
     /// Hands all grains beyond the edge over to the continuum.
     ///
     /// # Errors
@@ -58,7 +58,7 @@ impl<L: ShearLaw> ForceBlending<L> {
         let density = spec.rheology.bulk_density();
         // Where the copy begins its weight vanishes: no stress of its own there.
         let own = |_: &Strip, face: usize| if face == 0 { 1.0 } else { 0.0 };
-        let start = Start::of(spec, simulation, own)?;
+        let start = Start::of(&spec, simulation, own)?;
         let (edge, strip) = (start.edge, start.strip);
         simulation.remove(|g| !g.fixed && edge.distance(&g.position) > 0.0);
         let steps = start.settings.exchange_time / simulation.timestep();

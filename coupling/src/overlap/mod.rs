@@ -46,7 +46,7 @@ pub use strip::Strip;
 use averages::Sight;
 use colluvium_continuum::grid::Boundary;
 use colluvium_continuum::rheology::ShearLaw;
-use colluvium_dem::{Diverged, SetupError, Simulation, Snapshot};
+use colluvium_dem::{Diverged, Record, SetupError, Simulation, Snapshot};
 use start::Start;
 
 /// Why an overlap cannot be made or go on.
@@ -117,7 +117,7 @@ pub struct Overlap<L> {
     snapshot: Snapshot,
 }
 
-impl<L: ShearLaw> Overlap<L> {
+impl<L: ShearLaw + Copy> Overlap<L> {
     /// Hands all grains beyond the edge over to the continuum: their mass becomes its mass, and its velocity is
     /// theirs, layer by layer.
     ///
@@ -127,6 +127,43 @@ impl<L: ShearLaw> Overlap<L> {
         spec: OverlapSpec<L>,
         simulation: &mut Simulation,
     ) -> Result<Self, OverlapError> {
+        let start = Start::of(&spec, simulation, |strip, f| strip.share(f))?;
+        let edge = start.edge;
+        let mut overlap = Self::around(start, simulation);
+        // Stresses as they are while all grains are still there.
+        overlap.sample(1.0);
+        if overlap.settings.normal_motion == NormalMotion::Riding {
+            let (grains, a) = (&overlap.snapshot.grains, overlap.strip.face(0));
+            overlap.normal_velocity = averages::normal_velocity(grains, &edge, a);
+        }
+        simulation.remove(|g| !g.fixed && edge.distance(&g.position) > 0.0);
+        overlap.grain_mass = simulation.free_mass();
+        overlap.prime(overlap.exchange_time(simulation))?;
+        overlap.open(simulation);
+        overlap.agree(simulation);
+        Ok(overlap)
+    }
+
+    /// Goes on from the checkpoint of an overlap with the same specification; the simulation is the one that was
+    /// joined, resumed itself.
+    ///
+    /// # Errors
+    /// If the checkpoint lacks something or does not belong to this specification.
+    pub fn resume(
+        spec: OverlapSpec<L>,
+        simulation: &Simulation,
+        record: &Record,
+    ) -> Result<Self, OverlapError> {
+        let (cells, mass_beyond) = record::cells(record).map_err(OverlapError::Record)?;
+        let share = |strip: &Strip, f: usize| strip.share(f);
+        let start = Start::of_cells(&spec, simulation, cells, mass_beyond, share)?;
+        let mut overlap = Self::around(start, simulation);
+        overlap.take_up(record)?;
+        Ok(overlap)
+    }
+
+    /// Nothing exchanged yet.
+    fn around(start: Start<L>, simulation: &Simulation) -> Self {
         let Start {
             settings,
             edge,
@@ -134,33 +171,15 @@ impl<L: ShearLaw> Overlap<L> {
             continuum,
             mass_beyond,
             snapshot,
-        } = Start::of(spec, simulation, |strip, f| strip.share(f))?;
-        let mut averages = Averages::new(&strip, settings.kernel);
-        // Stresses as they are while all grains are still there.
-        let sight = Sight {
-            snapshot: &snapshot,
-            edge: &edge,
-            strip: &strip,
-            continuum: continuum.velocities(),
-        };
-        averages.sample(&sight, 1.0);
-        let normal_velocity = match settings.normal_motion {
-            NormalMotion::Held => 0.0,
-            NormalMotion::Riding => {
-                averages::normal_velocity(&snapshot.grains, &edge, strip.face(0))
-            }
-        };
-        simulation.remove(|g| !g.fixed && edge.distance(&g.position) > 0.0);
+        } = start;
         let nodes = strip.nodes();
-        let steps = (settings.exchange_time / simulation.timestep())
-            .round()
-            .max(1.0) as u64;
-        let mut overlap = Self {
+        let steps = (settings.exchange_time / simulation.timestep()).round();
+        Self {
+            averages: Averages::new(&strip, settings.kernel),
             settings,
             edge,
             strip,
             continuum,
-            averages,
             shell: Shell::new(simulation.grain_count()),
             held: Held {
                 accelerations: vec![0.0; nodes],
@@ -174,17 +193,13 @@ impl<L: ShearLaw> Overlap<L> {
             },
             monitors: Monitors::default(),
             ledger: Ledger::default(),
-            steps,
+            steps: steps.max(1.0) as u64,
             made: 0,
-            normal_velocity,
+            normal_velocity: 0.0,
             mass_beyond,
             grain_mass: simulation.free_mass(),
             snapshot,
-        };
-        overlap.prime(overlap.exchange_time(simulation))?;
-        overlap.open(simulation);
-        overlap.agree(simulation);
-        Ok(overlap)
+        }
     }
 
     /// A step of the continuum that is taken back but for its stress and pressure, for grains to meet at once.

@@ -1,11 +1,32 @@
 //! Checkpoints of an overlap: named arrays, bit-exact.
 
+use super::shell::PULL;
 use super::{FaceStress, Ledger, Monitors, Overlap, OverlapError, Work};
 use colluvium_continuum::rheology::ShearLaw;
 use colluvium_continuum::yield_step::FlowState;
 use colluvium_dem::Record;
 
-impl<L: ShearLaw> Overlap<L> {
+/// Numbers of the array `state`; the last is the height of a cell, the fourth the mass beyond the edge.
+const STATE: usize = 15;
+
+/// Height of a cell and number of those beyond the edge, and the mass there.
+pub(super) fn cells(record: &Record) -> Result<((f64, usize), f64), String> {
+    let state = record.numbers("state")?;
+    let &[beyond] = record.counts("cells")? else {
+        return Err("array `cells` must have 1 number".into());
+    };
+    match (state.len() == STATE, state.get(3), state.last()) {
+        (true, Some(&mass), Some(&cell)) if mass > 0.0 && cell > 0.0 && cell.is_finite() => {
+            // More than any grid has: its own check says so.
+            Ok(((cell, beyond.min(1 << 40) as usize), mass))
+        }
+        _ => Err(format!(
+            "array `state` must have {STATE} numbers, lengths and masses positive"
+        )),
+    }
+}
+
+impl<L: ShearLaw + Copy> Overlap<L> {
     /// The whole state but for the grains', at any step, also between two exchanges.
     pub fn checkpoint(&self) -> Record {
         let mut record = Record::default();
@@ -45,20 +66,19 @@ impl<L: ShearLaw> Overlap<L> {
                 work.impedance,
                 work.relaxation,
                 self.shell.last_kick,
+                self.strip.cell,
             ],
         );
         numbers("pulls", self.shell.pulls());
         numbers("monitors", self.monitors.numbers());
         numbers("ledger", self.ledger.numbers().to_vec());
         record.counts.insert("made".into(), vec![self.made]);
+        let beyond = self.continuum.cells() - self.strip.nodes();
+        record.counts.insert("cells".into(), vec![beyond as u64]);
         record
     }
 
-    /// Goes on from a checkpoint of an overlap that was made in the same way.
-    ///
-    /// # Errors
-    /// If an array is missing or belongs to another overlap. Nothing can be said of the overlap's state then.
-    pub fn take_up(&mut self, record: &Record) -> Result<(), OverlapError> {
+    pub(super) fn take_up(&mut self, record: &Record) -> Result<(), OverlapError> {
         self.read(record).map_err(OverlapError::Record)
     }
 
@@ -80,11 +100,12 @@ impl<L: ShearLaw> Overlap<L> {
             *face = FaceStress { shear, pressure };
         }
         self.averages.started = true;
-        let state = sized("state", 14)?;
+        let state = sized("state", STATE)?;
+        let finite = |name: &str| sized(name, record.numbers(name)?.len());
         let flow = FlowState {
-            u: record.numbers("continuum/u")?.to_vec(),
-            p: record.numbers("continuum/p")?.to_vec(),
-            s: record.numbers("continuum/s")?.as_chunks::<2>().0.to_vec(),
+            u: finite("continuum/u")?.to_vec(),
+            p: finite("continuum/p")?.to_vec(),
+            s: finite("continuum/s")?.as_chunks::<2>().0.to_vec(),
         };
         self.continuum.take_up(flow, state[0])?;
         self.held
@@ -108,7 +129,14 @@ impl<L: ShearLaw> Overlap<L> {
             relaxation: state[12],
         };
         self.shell.last_kick = state[13];
-        self.shell.take_up(record.numbers("pulls")?);
+        let pulls = finite("pulls")?;
+        if !pulls.len().is_multiple_of(PULL) {
+            return Err(format!(
+                "array `pulls` has {} numbers, not {PULL} a grain",
+                pulls.len()
+            ));
+        }
+        self.shell.take_up(pulls);
         self.monitors = Monitors::from_numbers(record.numbers("monitors")?)?;
         self.ledger = Ledger::from_numbers(record.numbers("ledger")?)?;
         match record.counts("made")? {

@@ -57,6 +57,9 @@ pub struct Work {
     pub relaxation: f64,
 }
 
+/// Numbers of a grain in [`Shell::pulls`].
+pub(super) const PULL: usize = 12;
+
 /// Forces on one grain in the present step, by origin.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 struct Pull {
@@ -200,7 +203,7 @@ impl Shell {
     /// Reads them back.
     pub fn take_up(&mut self, flat: &[f64]) {
         self.pulls = flat
-            .as_chunks::<12>()
+            .as_chunks::<PULL>()
             .0
             .iter()
             .map(|p| {

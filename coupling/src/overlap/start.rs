@@ -21,16 +21,14 @@ pub(super) struct Start<L> {
     pub snapshot: Snapshot,
 }
 
-impl<L: ShearLaw> Start<L> {
-    /// Cells are cut so that the mass of the grains beyond the edge fills a whole number of them.
+impl<L: ShearLaw + Copy> Start<L> {
+    /// Cells are cut so that the mass of the grains beyond the edge fills a whole number of them; their velocities
+    /// are those of the grains, layer by layer.
     pub fn of(
-        spec: OverlapSpec<L>,
+        spec: &OverlapSpec<L>,
         simulation: &mut Simulation,
         share: impl Fn(&Strip, usize) -> f64,
     ) -> Result<Self, OverlapError> {
-        let settings = spec
-            .settings
-            .resolve(&spec.scales, sets_pressure(&spec.far_end))?;
         let edge = spec.edge;
         let mut snapshot = Snapshot::default();
         simulation.snapshot(&mut snapshot);
@@ -38,46 +36,75 @@ impl<L: ShearLaw> Start<L> {
         let leaves = free.filter(|g| edge.distance(&g.position) > 0.0);
         let mass_beyond: f64 = leaves.map(|g| g.mass).sum();
         let depth = mass_beyond / (spec.rheology.bulk_density() * edge.area());
+        let cell = spec.resolved()?.cell;
         check(
             "edge.position",
             edge.position,
-            depth >= settings.cell,
+            depth >= cell,
             "where grains of at least one cell's depth lie beyond it",
         )?;
-        let cells_beyond = (depth / settings.cell).round().max(1.0);
-        let strip = Strip::new(&settings, depth / cells_beyond);
+        let beyond = (depth / cell).round().max(1.0);
+        let mut start = Self::of_cells(
+            spec,
+            simulation,
+            (depth / beyond, beyond as usize),
+            mass_beyond,
+            share,
+        )?;
+        start.snapshot = snapshot;
+        let profile = velocity_profile(
+            &start.snapshot.grains,
+            &edge,
+            start.strip.face(0),
+            start.strip.cell,
+            start.continuum.cells(),
+        );
+        for (k, velocity) in profile.into_iter().enumerate() {
+            start.continuum.set_velocity(k, velocity);
+        }
+        Ok(start)
+    }
+
+    /// The continuum at rest, of cells of this height and so many beyond the edge.
+    pub fn of_cells(
+        spec: &OverlapSpec<L>,
+        simulation: &Simulation,
+        (cell, beyond): (f64, usize),
+        mass_beyond: f64,
+        share: impl Fn(&Strip, usize) -> f64,
+    ) -> Result<Self, OverlapError> {
+        let settings = spec.resolved()?;
+        let edge = spec.edge;
+        let strip = Strip::new(&settings, cell);
         check(
             "shell",
             settings.shell,
             strip.shell <= (strip.buffer as f64 + 1e-9) * strip.cell,
             "at most the buffer's width in whole cells",
         )?;
-        let mut continuum = FarSide::new(
+        let continuum = FarSide::new(
             &edge,
             &strip,
-            cells_beyond as usize,
+            beyond,
             &simulation.gravity(),
             spec.far_end,
             (spec.rheology, spec.strain_rate_floor),
             |face| share(&strip, face),
         )?;
-        let profile = velocity_profile(
-            &snapshot.grains,
-            &edge,
-            strip.face(0),
-            strip.cell,
-            continuum.cells(),
-        );
-        for (k, velocity) in profile.into_iter().enumerate() {
-            continuum.set_velocity(k, velocity);
-        }
         Ok(Self {
             settings,
             edge,
             strip,
             continuum,
             mass_beyond,
-            snapshot,
+            snapshot: Snapshot::default(),
         })
+    }
+}
+
+impl<L> OverlapSpec<L> {
+    fn resolved(&self) -> Result<Resolved, OverlapError> {
+        let free = sets_pressure(&self.far_end);
+        self.settings.resolve(&self.scales, free)
     }
 }

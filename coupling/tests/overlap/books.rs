@@ -32,11 +32,10 @@ fn a_restart_in_the_middle_of_an_exchange_changes_no_bit() {
     whole.advance(&mut simulation, 107).unwrap();
     assert!(!whole.at_exchange());
     let (grains, record) = (simulation.checkpoint(), whole.checkpoint());
-    // Another flow of the same bed, another past.
-    let (_, mut second) = joined(small_bed(), 10.0, moving(NormalMotion::Riding));
     let setup = small_bed().tilted(24.0);
     let mut resumed = Simulation::resume(setup, &grains).unwrap();
-    second.take_up(&record).unwrap();
+    let spec = || small_bed().continuum_above(10.0, moving(NormalMotion::Riding));
+    let mut second = Overlap::resume(spec(), &resumed, &record).unwrap();
     for steps in [1, 12, 300] {
         whole.advance(&mut simulation, steps).unwrap();
         second.advance(&mut resumed, steps).unwrap();
@@ -45,24 +44,29 @@ fn a_restart_in_the_middle_of_an_exchange_changes_no_bit() {
         assert_eq!(a.1, b.1);
     }
 
-    let mut short = record.clone();
-    short.numbers.get_mut("faces").unwrap().pop();
-    assert!(
-        second
-            .take_up(&short)
-            .unwrap_err()
-            .to_string()
-            .contains("`faces`")
-    );
-    let mut late = record;
+    let refused = |record: &Record| {
+        let error = Overlap::resume(spec(), &resumed, record)
+            .err()
+            .expect("refused");
+        error.to_string()
+    };
+    for name in record.numbers.keys().chain(record.counts.keys()) {
+        let mut poorer = record.clone();
+        poorer.numbers.remove(name);
+        poorer.counts.remove(name);
+        assert!(refused(&poorer).contains(&format!("`{name}`")), "{name}");
+        let mut shorter = record.clone();
+        let emptied = shorter.numbers.get_mut(name).map(Vec::clear);
+        emptied.or(shorter.counts.get_mut(name).map(Vec::clear));
+        // Before the first step no grain has been pulled at.
+        assert!(name == "pulls" || !refused(&shorter).is_empty(), "{name}");
+    }
+    let mut late = record.clone();
     late.counts.insert("made".into(), vec![20]);
-    assert!(
-        second
-            .take_up(&late)
-            .unwrap_err()
-            .to_string()
-            .contains("`made`")
-    );
+    assert!(refused(&late).contains("`made`"));
+    let mut endless = record;
+    endless.counts.insert("cells".into(), vec![u64::MAX]);
+    assert!(!refused(&endless).is_empty());
 }
 
 fn ledger_closes(height: f64, time: f64) {
