@@ -2,7 +2,7 @@
 //!
 //! From the grains outwards: *inner overlap* from a to the handshake surface m, *buffer* from m to the edge b,
 //! where the grains end. Grains have their full mass, weight and contacts everywhere; the continuum keeps a copy of
-//! full mass from a to b. Totals count grains inside m and continuum outside. What is exchanged:
+//! full mass from a to b, which weighs what the grains there weigh. Totals count grains inside m and continuum outside. What is exchanged:
 //!
 //! - *stresses*: faces of the copy bear w σ_grains + (1 − w) σ_continuum, with w from 1 at a to 0 at m, and
 //!   σ_grains coarse-grained (contact and kinetic) and averaged exponentially ([`Averages`]);
@@ -307,23 +307,31 @@ impl<L: ShearLaw + Copy> Overlap<L> {
     }
 
     fn step_continuum(&mut self, dt: f64) -> Result<(), OverlapError> {
-        let (faces, given, strip) = (&self.averages.faces, &self.given, &self.strip);
-        let area = self.edge.area();
+        let (averages, given, strip) = (&self.averages, &self.given, &self.strip);
+        let (area, weight) = (self.edge.area(), dt * self.gravity_along());
+        let cell_mass = area * self.continuum.cell_mass();
         self.continuum.step(
             dt,
-            |f| faces[f].shear,
+            |f| averages.faces[f].shear,
             |k| {
-                let relaxation = given.relaxation.get(k).copied().unwrap_or(0.0);
-                (couple(given, strip, k) - relaxation) / area
+                let of_node = averages.nodes.get(k).map_or(0.0, |node| {
+                    // The stress that the copy is given bears the grains' weight, so that is what it weighs.
+                    weight * (node.mass - cell_mass) - given.relaxation[k]
+                });
+                (couple(given, strip, k) + of_node) / area
             },
-            faces[0].pressure,
+            averages.faces[0].pressure,
         )?;
         Ok(())
     }
 
+    fn gravity_along(&self) -> f64 {
+        self.snapshot.gravity[self.edge.flow_axis]
+    }
+
     /// Books what the grains' kicks and the continuum's step have done.
     fn book(&mut self, dt: f64) {
-        let (area, gravity) = (self.edge.area(), self.snapshot.gravity);
+        let (area, gravity) = (self.edge.area(), self.gravity_along());
         let (ledger, given) = (&mut self.ledger, &self.given);
         ledger.shear += given.shear;
         ledger.pressure += given.pressure;
@@ -331,8 +339,10 @@ impl<L: ShearLaw + Copy> Overlap<L> {
         ledger.relaxation += given.relaxation.iter().sum::<f64>();
         ledger.spin += given.spin.iter().sum::<f64>();
         let cells = self.continuum.cells();
-        let mass = area * self.continuum.cell_mass() * cells as f64;
-        ledger.continuum_weight += dt * mass * gravity[self.edge.flow_axis];
+        let beyond = (cells - self.strip.nodes()) as f64;
+        let copy: f64 = self.averages.nodes.iter().map(|node| node.mass).sum();
+        let mass = copy + beyond * area * self.continuum.cell_mass();
+        ledger.continuum_weight += dt * mass * gravity;
         ledger.inner_stress -= dt * area * self.averages.faces[0].shear;
         ledger.far_stress += dt * area * self.continuum.shear_stress(cells);
     }

@@ -72,13 +72,15 @@ fn a_level_column_rests() {
     }
 }
 
-/// The study's case: the continuum is below its yield stress, and creeps no more than its floor lets it.
+/// Below the yield stress the continuum creeps no more than its floor and the grains' last sway let it. The grains here
+/// are packed 6 % denser than the continuum: a copy that weighed what the continuum weighs would creep at 8e-3 for
+/// ever, by the stress that the grains' greater weight has in excess.
 #[test]
 #[ignore = "half a minute; run by tests/validate.sh"]
 fn a_column_on_fifteen_degrees_rests() {
     for rest in rest(deep_bed(), 15.0, 16.0, [60.0, 60.0], 1.0) {
-        assert!(rest.speeds[0] < 1e-3, "{:e}", rest.speeds[0]);
-        assert!(rest.speeds[1] < 1e-3, "{:e}", rest.speeds[1]);
-        assert!(rest.drift.abs() < 1e-3, "{:e}", rest.drift);
+        assert!(rest.speeds[0] < 5e-3, "{:e}", rest.speeds[0]);
+        assert!(rest.speeds[1] < 1e-4, "{:e}", rest.speeds[1]);
+        assert!(rest.drift.abs() < 1e-4, "{:e}", rest.drift);
     }
 }
