@@ -26,6 +26,7 @@ mod averages;
 mod edge;
 mod far_side;
 pub mod force_blending;
+pub mod joined_incline;
 mod ledger;
 mod monitors;
 mod record;
@@ -457,6 +458,11 @@ impl<L: ShearLaw + Copy> Overlap<L> {
             self.ledger.grains_error(self.grain_momentum(simulation)),
             self.ledger.continuum_error(self.continuum_momentum()),
         ]
+    }
+
+    /// Steps of the grains in one step of the continuum.
+    pub fn steps_of_an_exchange(&self) -> u64 {
+        self.steps
     }
 
     /// Whether an exchange has just been made.

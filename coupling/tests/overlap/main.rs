@@ -7,6 +7,7 @@
 mod books;
 mod comparison;
 mod incline;
+mod joined;
 mod motion;
 mod pulse;
 mod rest;
