@@ -1,11 +1,12 @@
-//! Where grains end: signed distance, directions, patches.
+//! Where grains end: signed distance, directions, area.
 
 use colluvium_dem::Domain;
 use nalgebra::Vector3;
 
-/// The edge b of a zone of grains, cut into patches, each with a column of continuum on its other side.
+/// The edge b of a zone of grains, with one column of continuum on its other side.
 ///
-/// Everything else in this folder asks the geometry these questions only.
+/// What is averaged over grains and what acts on them asks the geometry these questions only; an edge of several
+/// columns is several such edges, each with its share of the grains.
 pub trait ZoneEdge {
     /// Distance of a point from the edge (m), positive outwards, where there are no grains.
     fn distance(&self, x: &Vector3<f64>) -> f64;

@@ -187,12 +187,6 @@ impl Shell {
         shell
     }
 
-    /// Takes loads off all grains.
-    pub fn let_go(&mut self, simulation: &mut Simulation) -> Result<(), SetupError> {
-        self.loads.clear();
-        simulation.set_loads(&self.loads)
-    }
-
     /// Forces in the present step, by grain number, for a checkpoint.
     pub fn pulls(&self) -> Vec<f64> {
         let vectors = |p: &Pull| [p.traction, p.impedance, p.relaxation, p.moment];

@@ -3,6 +3,7 @@
 use crate::comparison::profile;
 use crate::world::{Bed, DENSITY, deep_bed, law, rheology, scales, small_bed, steps};
 use colluvium_continuum::grid::Boundary;
+use colluvium_continuum::rheology::MuI;
 use colluvium_coupling::coarse_graining::ProfileRow;
 use colluvium_coupling::overlap::{
     FlatEdge, NormalMotion, Overlap, OverlapSettings, OverlapSpec, Report,
@@ -40,6 +41,21 @@ fn lattice(velocity: Vector3<f64>) -> Setup {
     }
 }
 
+/// A continuum that rides on the grains.
+fn riding(edge: FlatEdge, rheology: MuI) -> OverlapSpec<MuI> {
+    OverlapSpec {
+        edge,
+        rheology,
+        far_end: Boundary::FreeSurface,
+        scales: scales(rheology.bulk_density()),
+        settings: OverlapSettings {
+            normal_motion: Some(NormalMotion::Riding),
+            ..Default::default()
+        },
+        strain_rate_floor: 1e-6,
+    }
+}
+
 /// Without gravity and load nothing may act between two sides that move alike, in any direction.
 #[test]
 fn uniform_translation_is_free_of_forces() {
@@ -62,17 +78,7 @@ fn uniform_translation_is_free_of_forces() {
             edge.area = 6.12 * 6.12;
             let mut material = rheology();
             material.solid_fraction = std::f64::consts::PI / 6.0 / 1.02_f64.powi(3);
-            let spec = OverlapSpec {
-                edge,
-                rheology: material,
-                far_end: Boundary::FreeSurface,
-                scales: scales(material.bulk_density()),
-                settings: OverlapSettings {
-                    normal_motion: Some(NormalMotion::Riding),
-                    ..Default::default()
-                },
-                strain_rate_floor: 1e-6,
-            };
+            let spec = riding(edge, material);
             let mut overlap = Overlap::replace(spec, &mut simulation).unwrap();
             overlap.advance(&mut simulation, 500).unwrap();
             let mut snapshot = Snapshot::default();
@@ -101,18 +107,7 @@ fn a_jump_of_velocity_dies_out_at_equal_and_opposite_cost() {
     let mut simulation = Simulation::new(lattice(Vector3::zeros())).unwrap();
     simulation.give_velocity(|g| Vector3::x() * if g.position.z > 12.3 { 1.0 } else { 0.0 });
     let edge = FlatEdge::across(simulation.domain(), 2, 0, true, 12.24);
-    let material = rheology();
-    let spec = OverlapSpec {
-        edge,
-        rheology: material,
-        far_end: Boundary::FreeSurface,
-        scales: scales(material.bulk_density()),
-        settings: OverlapSettings {
-            normal_motion: Some(NormalMotion::Riding),
-            ..Default::default()
-        },
-        strain_rate_floor: 1e-6,
-    };
+    let spec = riding(edge, rheology());
     let mut overlap = Overlap::replace(spec, &mut simulation).unwrap();
     let slip = |o: &Overlap<_>| {
         let nodes = o.averages().nodes.iter();
