@@ -3,25 +3,28 @@
 use crate::grains::vector;
 use crate::simulation::Simulation;
 use crate::snapshot::GrainSample;
+use nalgebra::Vector3;
 
 impl Simulation {
-    /// All grains, in the order of their rows: positions now, velocities and spins half a step back.
+    /// The grains at places for which `near` says so, in the order of their rows: positions now, velocities and
+    /// spins half a step back.
     ///
-    /// Other than a [`snapshot`](Self::snapshot) it evaluates no forces.
-    pub fn held(&self) -> impl Iterator<Item = GrainSample> + '_ {
-        let cell = self.cell();
+    /// Other than a [`snapshot`](Self::snapshot) it evaluates no forces, and it takes no position into the box:
+    /// along periodic axes `near` sees places that may be some boxes away.
+    pub fn held(&self, near: impl Fn(&Vector3<f64>) -> bool) -> impl Iterator<Item = GrainSample> {
         let grains = &self.grains;
-        (0..grains.len()).map(move |i| {
-            let (position, image) = cell.wrap(vector(&grains.place[i]));
-            GrainSample {
+        let places = grains.place[..grains.len()].iter().enumerate();
+        places.filter_map(move |(i, place)| {
+            let position = vector(place);
+            near(&position).then(|| GrainSample {
                 id: grains.id[i],
                 position,
-                velocity: vector(&grains.motion[i]) - image,
+                velocity: vector(&grains.motion[i]),
                 spin: vector(&grains.turn[i]) * grains.turn[i][3],
-                radius: grains.place[i][3],
+                radius: place[3],
                 mass: grains.mass[i],
                 fixed: grains.is_fixed(i),
-            }
+            })
         })
     }
 

@@ -8,7 +8,8 @@ use nalgebra::Vector3;
 /// What is averaged over grains and what acts on them asks the geometry these questions only; an edge of several
 /// columns is several such edges, each with its share of the grains.
 pub trait ZoneEdge {
-    /// Distance of a point from the edge (m), positive outwards, where there are no grains.
+    /// Distance of a point from the edge (m), positive outwards, where there are no grains; the same for all
+    /// images of the point along periodic axes.
     fn distance(&self, x: &Vector3<f64>) -> f64;
     /// Outward normal at a point.
     fn normal(&self, x: &Vector3<f64>) -> Vector3<f64>;
@@ -62,18 +63,22 @@ impl FlatEdge {
 }
 
 impl ZoneEdge for FlatEdge {
+    #[inline]
     fn distance(&self, x: &Vector3<f64>) -> f64 {
         self.sign() * (x[self.axis] - self.position)
     }
 
+    #[inline]
     fn normal(&self, _: &Vector3<f64>) -> Vector3<f64> {
         self.sign() * Vector3::ith(self.axis, 1.0)
     }
 
+    #[inline]
     fn tangent(&self, _: &Vector3<f64>) -> Vector3<f64> {
         Vector3::ith(self.flow_axis, 1.0)
     }
 
+    #[inline]
     fn area(&self) -> f64 {
         self.area
     }

@@ -7,7 +7,7 @@ use super::shell::Given;
 use super::strip::Strip;
 use super::{Ledger, Overlap, OverlapError};
 use colluvium_continuum::rheology::ShearLaw;
-use colluvium_dem::Simulation;
+use colluvium_dem::{Partner, Simulation};
 
 impl<L: ShearLaw + Copy> Overlap<L> {
     /// Opens the ledger with what there is now.
@@ -70,7 +70,7 @@ impl<L: ShearLaw + Copy> Overlap<L> {
     /// Averages of the grains to the continuum, its step, and what it does to the grains until the next exchange.
     fn exchange(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
         let dt = self.exchange_time(simulation);
-        simulation.snapshot(&mut self.snapshot);
+        self.look(simulation);
         self.sample(dt / self.settings.stress_time);
         self.step_continuum(dt)?;
         self.book(dt);
@@ -92,6 +92,24 @@ impl<L: ShearLaw + Copy> Overlap<L> {
         let given = &mut self.given;
         (given.shear, given.pressure, given.impedance, given.time) = (0.0, 0.0, 0.0, 0.0);
         Ok(())
+    }
+
+    /// Takes a snapshot whose bits do not depend on the order of the grains' lists, which a restart may change: contacts
+    /// are sorted, and velocities are those that the integrator holds, half a step back, free of sums of forces.
+    pub(super) fn look(&mut self, simulation: &mut Simulation) {
+        simulation.snapshot(&mut self.snapshot);
+        self.snapshot.contacts.sort_unstable_by_key(|contact| {
+            let (kind, other) = match contact.partner {
+                Partner::Grain(other) => (0, other),
+                Partner::Wall(other) => (1, other),
+                Partner::Body(other) => (2, other),
+            };
+            (contact.grain, kind, other)
+        });
+        let held = simulation.held(|_| true);
+        for (seen, held) in self.snapshot.grains.iter_mut().zip(held) {
+            (seen.velocity, seen.spin) = (held.velocity, held.spin);
+        }
     }
 
     pub(super) fn sample(&mut self, lapse: f64) {

@@ -13,7 +13,7 @@
 
 use super::edge::ZoneEdge;
 use super::strip::Strip;
-use colluvium_dem::{Load, SetupError, Simulation};
+use colluvium_dem::{GrainSample, Load, SetupError, Simulation};
 use nalgebra::Vector3;
 
 /// Traction of the continuum, held over an exchange, and the accelerations of nodes.
@@ -73,6 +73,7 @@ struct Pull {
 #[derive(Clone, Debug, Default)]
 pub struct Shell {
     loads: Vec<Load>,
+    near: Vec<Near>,
     /// By grain number.
     pulls: Vec<Pull>,
     /// Work since the start; that of the last kick is half booked.
@@ -83,10 +84,15 @@ pub struct Shell {
     pub beyond: usize,
 }
 
-/// A shell of grains in one step.
-struct Weighed {
+/// A grain near the edge in one step.
+#[derive(Clone, Copy, Debug)]
+struct Near {
+    grain: GrainSample,
+    /// Distance from the edge (m).
+    s: f64,
+    /// Weight of its traction (kg).
     weight: f64,
-    velocity: f64,
+    normal: Vector3<f64>,
 }
 
 impl Shell {
@@ -94,6 +100,7 @@ impl Shell {
     pub fn new(grains: usize) -> Self {
         Self {
             loads: Vec::with_capacity(grains),
+            near: Vec::with_capacity(grains),
             ..Self::default()
         }
     }
@@ -108,23 +115,19 @@ impl Shell {
         given: &mut Given,
     ) -> Result<Option<f64>, SetupError> {
         let kick = simulation.next_kick();
-        let shell = self.weigh(simulation, edge, strip);
-        let mean = (shell.weight > 0.0).then(|| shell.velocity / shell.weight);
+        let [weight, momentum] = self.weigh(simulation, edge, strip);
+        let mean = (weight > 0.0).then(|| momentum / weight);
         let area = edge.area();
         let through = mean.map_or(0.0, |v| impedance * (v - continuum_velocity));
+        let per_weight = area / weight.max(f64::MIN_POSITIVE);
         self.loads.clear();
-        let reach = strip.face(0);
-        for grain in simulation.held() {
-            let s = edge.distance(&grain.position);
-            if grain.fixed || s < reach {
-                continue;
-            }
-            let (n, t) = (edge.normal(&grain.position), edge.tangent(&grain.position));
-            let share =
-                strip.traction_weight(grain.mass, s) * area / shell.weight.max(f64::MIN_POSITIVE);
+        for near in &self.near {
+            let grain = &near.grain;
+            let (n, t) = (near.normal, edge.tangent(&grain.position));
+            let share = near.weight * per_weight;
             let (mut rate, mut turn) = (0.0, 0.0);
             let inertia = 0.4 * grain.mass * grain.radius * grain.radius;
-            for (k, h) in strip.shares(s) {
+            for (k, h) in strip.shares(near.s) {
                 let acceleration = h * held.accelerations[k];
                 let spin = h * held.spins[k];
                 rate += acceleration;
@@ -159,15 +162,18 @@ impl Shell {
         Ok(mean)
     }
 
-    /// Weighs the shell, and books the second half of the last kick's work.
-    fn weigh<E: ZoneEdge>(&mut self, simulation: &Simulation, edge: &E, strip: &Strip) -> Weighed {
-        let mut shell = Weighed {
-            weight: 0.0,
-            velocity: 0.0,
-        };
+    /// Finds the grains on which anything may act, books the second half of the last kick's work on them, and
+    /// weighs the shell: Σ q and Σ q v·n.
+    fn weigh<E: ZoneEdge>(&mut self, simulation: &Simulation, edge: &E, strip: &Strip) -> [f64; 2] {
+        // The innermost node of the buffer reaches half a cell beyond m; what was pulled at in the last step has
+        // hardly moved.
+        let reach = strip.handshake() - strip.cell;
+        let (mut weight, mut momentum) = (0.0, 0.0);
         self.beyond = 0;
+        self.near.clear();
         let last = 0.5 * self.last_kick;
-        for grain in simulation.held().filter(|grain| !grain.fixed) {
+        let beyond_reach = |x: &Vector3<f64>| edge.distance(x) > reach;
+        for grain in simulation.held(beyond_reach).filter(|grain| !grain.fixed) {
             let id = grain.id as usize;
             if id >= self.pulls.len() {
                 self.pulls.resize(id + 1, Pull::default());
@@ -177,14 +183,19 @@ impl Shell {
                 self.work.add(&pull, (&grain.velocity, &grain.spin), last);
             }
             let s = edge.distance(&grain.position);
+            let normal = edge.normal(&grain.position);
             let q = strip.traction_weight(grain.mass, s);
-            if q > 0.0 {
-                shell.weight += q;
-                shell.velocity += q * grain.velocity.dot(&edge.normal(&grain.position));
-                self.beyond += usize::from(s > strip.cell);
-            }
+            weight += q;
+            momentum += q * grain.velocity.dot(&normal);
+            self.beyond += usize::from(s > strip.cell);
+            self.near.push(Near {
+                grain,
+                s,
+                weight: q,
+                normal,
+            });
         }
-        shell
+        [weight, momentum]
     }
 
     /// Forces in the present step, by grain number, for a checkpoint.

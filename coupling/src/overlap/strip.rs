@@ -39,6 +39,7 @@ impl Strip {
     }
 
     /// Place of a face, counted from a (m).
+    #[inline]
     pub fn face(&self, face: usize) -> f64 {
         (face as f64 - self.nodes() as f64) * self.cell
     }
@@ -59,6 +60,7 @@ impl Strip {
     }
 
     /// Nodes of a place and their weights.
+    #[inline]
     pub fn shares(&self, s: f64) -> Shares {
         let last = self.nodes() - 1;
         let t = (s - self.node(0)) / self.cell;
@@ -76,6 +78,7 @@ impl Strip {
     }
 
     /// Weight of the traction on a grain of this mass: q = m min(1, (s + b)/b) over the shell of width b.
+    #[inline]
     pub fn traction_weight(&self, mass: f64, s: f64) -> f64 {
         mass * ((s + self.shell) / self.shell).clamp(0.0, 1.0)
     }

@@ -214,10 +214,11 @@ fn has_no_kink(sheared: &Sheared, rates: f64) {
     assert!((inner / below - 1.0).abs() < 0.03, "{inner} {below}");
 }
 
-/// Seven diameters over the base its heat still speeds up the grains next to the overlap.
+/// Seven diameters over the base its heat still speeds up the grains next to the overlap, and rates over three layers in
+/// so short a window scatter by a tenth.
 #[test]
 fn plane_shear_hands_over_without_a_kink() {
-    has_no_kink(&shear(small_bed(), 10.0, [20.0, 30.0]), 0.2);
+    has_no_kink(&shear(small_bed(), 10.0, [20.0, 30.0]), 0.3);
 }
 
 #[test]
