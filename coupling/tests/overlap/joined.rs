@@ -41,8 +41,11 @@ fn spec() -> JoinedInclineSpec {
     }
 }
 
-/// Runs to the end in pieces of so many steps, restarted after each of them.
+/// Runs to the end in pieces of so many steps, restarted after each of them, on two threads.
 fn in_pieces(steps: u64) -> JoinedInclineResult {
+    let mut spec = spec();
+    spec.incline.threads = Threads::Rayon;
+    let spec = || spec.clone();
     let mut run = JoinedInclineRun::new(spec()).unwrap();
     while !run.finished() {
         run.advance(steps).unwrap();
