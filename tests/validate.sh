@@ -1,9 +1,9 @@
 #!/bin/sh
-# The long forms of the tests across crates and of the continuum: bulk laws with several seeds and sizes,
+# The long forms of the tests across crates, of the continuum and of the overlap: bulk laws with several seeds and sizes,
 # collapses and dam breaks on several grids, optimised.
 # Prints what they measure; 15 minutes on a quiet core, 25 on a busy one. A name as argument runs only the
 # tests that hold it.
 set -eu
 cd "$(dirname "$0")/.."
 .ci/system-packages
-cargo test --release -p colluvium-tests -p colluvium-continuum "$@" -- --ignored --nocapture
+cargo test --release -p colluvium-tests -p colluvium-continuum -p colluvium-coupling "$@" -- --ignored --nocapture

@@ -290,6 +290,11 @@ impl Discretisation {
         &self.points
     }
 
+    /// The quadrature points, to be changed.
+    pub(crate) fn points_mut(&mut self) -> &mut [QuadraturePoint] {
+        &mut self.points
+    }
+
     /// Mass of each velocity's control volume.
     pub fn mass(&self) -> &[f64] {
         &self.mass

@@ -8,7 +8,7 @@ use std::ops::ControlFlow;
 
 use serde::{Deserialize, Serialize};
 
-use crate::discretisation::{Discretisation, ThresholdPressure};
+use crate::discretisation::{Discretisation, QuadraturePoint, ThresholdPressure};
 use crate::error::{Error, require};
 use crate::grid::{DIMENSIONS, Grid};
 use crate::rheology::{Rheology, strain_rate_norm};
@@ -360,6 +360,21 @@ impl<R: Rheology> Flow<R> {
     fn largest_change(&self) -> f64 {
         let changes = self.state.u.iter().zip(&self.previous);
         changes.fold(0.0, |m, (a, b)| m.max((a - b).abs()))
+    }
+
+    /// Force on each velocity, to be changed between steps.
+    pub(crate) fn load_mut(&mut self) -> &mut [f64] {
+        &mut self.load
+    }
+
+    /// Velocity, pressure and stress, to be changed between steps.
+    pub(crate) fn state_mut(&mut self) -> &mut FlowState {
+        &mut self.state
+    }
+
+    /// The quadrature points, to be changed between steps.
+    pub(crate) fn points_mut(&mut self) -> &mut [QuadraturePoint] {
+        self.discretisation.points_mut()
     }
 
     /// The discrete operators.

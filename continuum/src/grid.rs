@@ -4,6 +4,7 @@
 //! so a third one is a longer array.
 
 use crate::error::{Error, require};
+use crate::units::Units;
 use crate::wall_friction::WallFriction;
 
 /// Number of axes of the grid.
@@ -46,6 +47,24 @@ impl Boundary {
             Boundary::NoSlip { .. } | Boundary::CoulombWall { .. } | Boundary::FreeSlip => None,
             Boundary::FreeSurface => Some(0.0),
             Boundary::LoadedWall { pressure, .. } => Some(*pressure),
+        }
+    }
+
+    /// The same boundary with velocities and stresses divided by the given units.
+    pub(crate) fn in_units(self, units: &Units) -> Self {
+        match self {
+            Boundary::NoSlip { velocity } => Boundary::NoSlip {
+                velocity: velocity / units.velocity,
+            },
+            Boundary::LoadedWall { velocity, pressure } => Boundary::LoadedWall {
+                velocity: velocity / units.velocity,
+                pressure: pressure / units.stress(),
+            },
+            Boundary::CoulombWall { velocity, friction } => Boundary::CoulombWall {
+                velocity: velocity / units.velocity,
+                friction: friction.in_units(units),
+            },
+            Boundary::FreeSlip | Boundary::FreeSurface => self,
         }
     }
 

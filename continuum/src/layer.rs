@@ -121,23 +121,6 @@ pub(crate) fn validate_grid(cells: usize, columns: Option<usize>) -> Result<(), 
 }
 
 impl<L: Rheology> Layer<'_, L> {
-    fn boundary_in_units(&self, boundary: Boundary) -> Boundary {
-        match boundary {
-            Boundary::NoSlip { velocity } => Boundary::NoSlip {
-                velocity: velocity / self.units.velocity,
-            },
-            Boundary::LoadedWall { velocity, pressure } => Boundary::LoadedWall {
-                velocity: velocity / self.units.velocity,
-                pressure: pressure / self.units.stress(),
-            },
-            Boundary::CoulombWall { velocity, friction } => Boundary::CoulombWall {
-                velocity: velocity / self.units.velocity,
-                friction: friction.in_units(&self.units),
-            },
-            Boundary::FreeSlip | Boundary::FreeSurface => boundary,
-        }
-    }
-
     /// Computes the steady flow and compares it with the exact velocity and pressure at height z.
     pub(crate) fn solve(
         &self,
@@ -166,8 +149,8 @@ impl<L: Rheology> Layer<'_, L> {
         let across = Axis::Bounded {
             length: 1.0,
             cells: self.cells,
-            low: self.boundary_in_units(self.low),
-            high: self.boundary_in_units(self.high),
+            low: self.low.in_units(&units),
+            high: self.high.in_units(&units),
         };
         let grid = Grid::new([along, across])?;
         let law = self.rheology.in_units(&units);

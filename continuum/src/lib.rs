@@ -41,6 +41,7 @@
 //! ```
 
 pub mod bagnold;
+pub mod column;
 pub mod column_collapse;
 pub mod discretisation;
 mod error;

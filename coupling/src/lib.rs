@@ -5,4 +5,5 @@ pub mod calibration;
 pub mod campaign;
 pub mod coarse_graining;
 pub mod incline;
+pub mod overlap;
 pub mod steady_state;

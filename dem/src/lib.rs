@@ -21,6 +21,7 @@ mod forces;
 mod grains;
 mod gravity;
 mod grid;
+mod held;
 mod lanes;
 mod ledger;
 mod loads;

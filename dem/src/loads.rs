@@ -188,7 +188,8 @@ impl Simulation {
         }
     }
 
-    /// Puts steady loads on grains, in place of those there were; they act from now on.
+    /// Puts steady loads on grains, in place of those there were; they act from now on. Nothing is allocated as
+    /// long as their number does not double.
     ///
     /// On a fixed grain a load does nothing. Removing a grain drops its load.
     ///
@@ -197,7 +198,12 @@ impl Simulation {
     pub fn set_loads(&mut self, loads: &[Load]) -> Result<(), SetupError> {
         self.places.lay(&self.grains);
         for (k, load) in loads.iter().enumerate() {
+            // Names are formed for what is refused only: loads may change every step.
             let known = self.places.of(load.grain) != GONE;
+            let finite = |v: &Vector3<f64>| v.iter().all(|c| c.is_finite());
+            if known && finite(&load.force) && finite(&load.moment) {
+                continue;
+            }
             let key = format!("loads[{k}].grain");
             check(&key, f64::from(load.grain), "the number of a grain", |_| {
                 known
@@ -209,7 +215,13 @@ impl Simulation {
             }
         }
         self.forget_observation();
-        self.loads.given = loads.to_vec();
+        self.loads.given.clear();
+        if self.loads.given.capacity() < loads.len() {
+            // Where loads change every step their number does too.
+            self.loads.given.reserve(2 * loads.len());
+            self.loads.places.reserve(2 * loads.len());
+        }
+        self.loads.given.extend_from_slice(loads);
         self.loads.settle(&self.places);
         Ok(())
     }

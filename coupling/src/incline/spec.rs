@@ -219,7 +219,7 @@ impl InclineSpec {
         Some(Wall::plane(Vector3::z() * lowest, Vector3::z()))
     }
 
-    pub(super) fn setup(&self) -> Setup {
+    pub(crate) fn setup(&self) -> Setup {
         let mut grains = self.bed.clone();
         let stretch = self.starting_stretch();
         for grain in grains.iter_mut().filter(|g| !g.fixed && g.position.z > 0.0) {

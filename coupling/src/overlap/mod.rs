@@ -1,0 +1,305 @@
+//! Grains on one side of an edge, continuum on the other, and an overlap in which they exchange their states.
+//!
+//! From the grains outwards: *inner overlap* from a to the handshake surface m, *buffer* from m to the edge b,
+//! where the grains end. Grains have their full mass, weight and contacts everywhere; the continuum keeps a copy of
+//! full mass from a to b, which weighs what the grains there weigh. Totals count grains inside m and continuum outside. What is exchanged:
+//!
+//! - *stresses*: faces of the copy bear w σ_grains + (1 − w) σ_continuum, with w from 1 at a to 0 at m, and
+//!   σ_grains coarse-grained (contact and kinetic) and averaged exponentially ([`Averages`]);
+//! - *traction*: the outermost grains bear the continuum's stress on the edge, whose normal part yields to
+//!   waves as an impedance does (`shell.rs`);
+//! - *velocity*: in the buffer, mean velocities relax to each other, equal and opposite, and mean spins to half
+//!   the vorticity, whose couple the continuum takes as an antisymmetric stress; in the inner overlap the copy
+//!   follows the grains;
+//! - *mass*: the continuum is what the total has beyond the grains' own masses.
+//!
+//! Grains make explicit steps inside one implicit step of the continuum. Forces are never blended: that has no
+//! unique split of stress between the two
+//! ([`force_blending`]).
+//!
+//! # What it cannot do
+//! The continuum has no granular temperature: over a rough base it must not stand under flowing grains. One
+//! edge, flat and normal to an axis, is joined to one column ([`FlatEdge`]); what acts on grains goes by the
+//! questions of [`ZoneEdge`] alone.
+
+mod averages;
+mod edge;
+mod exchange;
+mod far_side;
+pub mod force_blending;
+pub mod joined_incline;
+mod ledger;
+mod monitors;
+mod record;
+mod settings;
+mod shell;
+mod start;
+mod strip;
+
+pub use averages::{Averages, FaceStress, Node};
+pub use edge::{FlatEdge, ZoneEdge};
+pub use far_side::FarSide;
+pub use ledger::Ledger;
+pub use monitors::{Monitors, Report};
+pub use settings::{NormalMotion, OverlapSettings, Resolved, Scales, StressKernel};
+pub use shell::{Held, Work};
+pub use strip::Strip;
+
+use colluvium_continuum::grid::Boundary;
+use colluvium_continuum::rheology::ShearLaw;
+use colluvium_dem::{Diverged, Record, SetupError, Simulation, Snapshot};
+use shell::{Given, Shell};
+use start::Start;
+
+/// Why an overlap cannot be made or go on.
+#[derive(Clone, Debug, PartialEq, thiserror::Error)]
+pub enum OverlapError {
+    /// A number is out of range.
+    #[error("overlap.{key} = {value}: must be {allowed}")]
+    OutOfRange {
+        /// Name of the key.
+        key: &'static str,
+        /// The value found.
+        value: f64,
+        /// What is allowed.
+        allowed: &'static str,
+    },
+    /// The grains refuse a load.
+    #[error(transparent)]
+    Setup(#[from] SetupError),
+    /// The grains flew apart.
+    #[error(transparent)]
+    Diverged(#[from] Diverged),
+    /// The continuum's step failed.
+    #[error("continuum of the overlap: {0}")]
+    Continuum(#[from] colluvium_continuum::Error),
+    /// A checkpoint does not belong to this overlap.
+    #[error("checkpoint: {0}")]
+    Record(String),
+}
+
+/// What an overlap is made from.
+#[derive(Clone, Debug)]
+pub struct OverlapSpec<L> {
+    /// Where grains end.
+    pub edge: FlatEdge,
+    /// Material of the continuum.
+    pub rheology: L,
+    /// What holds at its far end.
+    pub far_end: Boundary,
+    /// What defaults are formed from.
+    pub scales: Scales,
+    /// Settings.
+    pub settings: OverlapSettings,
+    /// Strain-rate floor of the continuum's yield step, in √(g/H).
+    pub strain_rate_floor: f64,
+}
+
+/// Grains and continuum joined at one edge. The grains are the caller's: every call needs the same simulation.
+pub struct Overlap<L> {
+    settings: Resolved,
+    edge: FlatEdge,
+    strip: Strip,
+    continuum: FarSide<L>,
+    averages: Averages,
+    shell: Shell,
+    held: Held,
+    given: Given,
+    monitors: Monitors,
+    ledger: Ledger,
+    /// Steps of the grains in one of the continuum, and those made since the last exchange.
+    steps: u64,
+    made: u64,
+    /// Velocity of the continuum along n (m/s).
+    normal_velocity: f64,
+    /// Mass of the continuum beyond the edge (kg).
+    mass_beyond: f64,
+    /// Mass of the free grains (kg).
+    grain_mass: f64,
+    snapshot: Snapshot,
+}
+
+impl<L: ShearLaw + Copy> Overlap<L> {
+    /// Hands all grains beyond the edge over to the continuum: their mass becomes its mass, and its velocity is
+    /// theirs, layer by layer.
+    ///
+    /// # Errors
+    /// Settings out of range, or nothing beyond the edge.
+    pub fn replace(
+        spec: OverlapSpec<L>,
+        simulation: &mut Simulation,
+    ) -> Result<Self, OverlapError> {
+        let start = Start::of(&spec, simulation, |strip, f| strip.share(f))?;
+        let edge = start.edge;
+        let mut overlap = Self::around(start, simulation);
+        // Stresses as they are while all grains are still there.
+        overlap.sample(1.0);
+        if overlap.settings.normal_motion == NormalMotion::Riding {
+            let (grains, a) = (&overlap.snapshot.grains, overlap.strip.face(0));
+            overlap.normal_velocity = averages::normal_velocity(grains, &edge, a);
+        }
+        simulation.remove(|g| !g.fixed && edge.distance(&g.position) > 0.0);
+        overlap.grain_mass = simulation.free_mass();
+        overlap.prime(overlap.exchange_time(simulation))?;
+        overlap.open(simulation);
+        overlap.agree(simulation);
+        Ok(overlap)
+    }
+
+    /// Goes on from the checkpoint of an overlap with the same specification; the simulation is the one that was
+    /// joined, resumed itself.
+    ///
+    /// # Errors
+    /// If the checkpoint lacks something or does not belong to this specification.
+    pub fn resume(
+        spec: OverlapSpec<L>,
+        simulation: &Simulation,
+        record: &Record,
+    ) -> Result<Self, OverlapError> {
+        let (cells, mass_beyond) = record::cells(record).map_err(OverlapError::Record)?;
+        let share = |strip: &Strip, f: usize| strip.share(f);
+        let start = Start::of_cells(&spec, simulation, cells, mass_beyond, share)?;
+        let mut overlap = Self::around(start, simulation);
+        overlap.take_up(record)?;
+        Ok(overlap)
+    }
+
+    /// Nothing exchanged yet.
+    fn around(start: Start<L>, simulation: &Simulation) -> Self {
+        let Start {
+            settings,
+            edge,
+            strip,
+            continuum,
+            mass_beyond,
+            snapshot,
+        } = start;
+        let nodes = strip.nodes();
+        let steps = (settings.exchange_time / simulation.timestep()).round();
+        Self {
+            averages: Averages::new(&strip, settings.kernel),
+            settings,
+            edge,
+            strip,
+            continuum,
+            shell: Shell::new(simulation.grain_count()),
+            held: Held {
+                accelerations: vec![0.0; nodes],
+                spins: vec![0.0; nodes],
+                ..Held::default()
+            },
+            given: Given {
+                relaxation: vec![0.0; nodes],
+                spin: vec![0.0; nodes],
+                ..Given::default()
+            },
+            monitors: Monitors::default(),
+            ledger: Ledger::default(),
+            steps: steps.max(1.0) as u64,
+            made: 0,
+            normal_velocity: 0.0,
+            mass_beyond,
+            grain_mass: simulation.free_mass(),
+            snapshot,
+        }
+    }
+
+    /// A step of the continuum that is taken back but for its stress and pressure, for grains to meet at once.
+    fn prime(&mut self, dt: f64) -> Result<(), OverlapError> {
+        let velocities = self.continuum.velocities().to_vec();
+        self.step_continuum(dt)?;
+        for (k, velocity) in velocities.into_iter().enumerate() {
+            self.continuum.set_velocity(k, velocity);
+        }
+        Ok(())
+    }
+
+    /// Momentum of the grains along the flow and outwards, with what walls have taken (N s).
+    fn grain_momentum(&self, simulation: &mut Simulation) -> [f64; 2] {
+        let momentum = simulation.leapfrog_momentum() + simulation.wall_impulse();
+        let n = self.edge.normal(&momentum);
+        [momentum[self.edge.flow_axis], momentum.dot(&n)]
+    }
+
+    /// Momentum of the continuum along the flow, copy included (N s).
+    fn continuum_momentum(&self) -> f64 {
+        let mass = self.edge.area() * self.continuum.cell_mass();
+        mass * self.continuum.velocities().iter().sum::<f64>()
+    }
+
+    /// Settings in use.
+    pub fn settings(&self) -> &Resolved {
+        &self.settings
+    }
+
+    /// The edge as it is now.
+    pub fn edge(&self) -> &FlatEdge {
+        &self.edge
+    }
+
+    /// Faces and nodes.
+    pub fn strip(&self) -> &Strip {
+        &self.strip
+    }
+
+    /// The continuum.
+    pub fn continuum(&self) -> &FarSide<L> {
+        &self.continuum
+    }
+
+    /// Averages of the grains.
+    pub fn averages(&self) -> &Averages {
+        &self.averages
+    }
+
+    /// What acts on the grains until the next exchange.
+    pub fn held(&self) -> &Held {
+        &self.held
+    }
+
+    /// Work of what acts on the grains since the start (J).
+    pub fn work(&self) -> Work {
+        self.shell.work
+    }
+
+    /// Velocity of the continuum along n (m/s).
+    pub fn normal_velocity(&self) -> f64 {
+        self.normal_velocity
+    }
+
+    /// Accounts since the start.
+    pub fn ledger(&self) -> &Ledger {
+        &self.ledger
+    }
+
+    /// Starts the monitors anew.
+    pub fn watch(&mut self) {
+        self.monitors = Monitors::default();
+    }
+
+    /// What the monitors say.
+    pub fn report(&self) -> Report {
+        self.monitors.report()
+    }
+
+    /// Relative errors of the ledger: mass, momentum of the grains, momentum of the continuum. Valid right after
+    /// an exchange ([`at_exchange`](Self::at_exchange)).
+    pub fn ledger_errors(&self, simulation: &mut Simulation) -> [f64; 3] {
+        let mass = simulation.free_mass() + self.mass_beyond;
+        [
+            (mass / self.ledger.mass_before - 1.0).abs(),
+            self.ledger.grains_error(self.grain_momentum(simulation)),
+            self.ledger.continuum_error(self.continuum_momentum()),
+        ]
+    }
+
+    /// Steps of the grains in one step of the continuum.
+    pub fn steps_of_an_exchange(&self) -> u64 {
+        self.steps
+    }
+
+    /// Whether an exchange has just been made.
+    pub fn at_exchange(&self) -> bool {
+        self.made == 0
+    }
+}

@@ -1,0 +1,14 @@
+//! The overlap of grains and continuum against full runs of grains, closed forms and conservation.
+//!
+//! Units: mean diameter, mean mass and gravity are 1; times are √(d/g).
+
+#![allow(clippy::unwrap_used)]
+
+mod books;
+mod comparison;
+mod incline;
+mod joined;
+mod motion;
+mod pulse;
+mod rest;
+mod world;
