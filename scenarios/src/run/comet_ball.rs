@@ -2,39 +2,18 @@
 //!
 //! A ballistic aggregate of single grains (solid fraction 0.15, a tree of contacts) is pulled to its centre
 //! until it is dense enough: so it hangs together at porosities that a loose cloud pulled to its centre
-//! would leave in flight. Grains are soft meanwhile, which allows long steps, and are then made stiff by
-//! factors of two:
-//!
-//! ```text
-//! U(δ) = 2/5 δ^{5/2} - δ < 0  at  δ_0 = s^{2/3}        while s < 2.5
-//! ```
-//! in units of the new depth of rest and the pull-off force: a pair that rests at its old depth δ_0 when E is
-//! raised by the factor s does not let go.
-//!
-//! ```text
-//! σ_R = 1.1 φ/(1 - φ) F_c/d²        Rumpf's estimate of the strength (1962); F_c pull-off force of two mean
-//!                                    grains, d their diameter
-//! ```
+//! would leave in flight.
 
+use super::comet::Comet;
 use super::world::Workshop;
 use super::world::workshop::Surroundings;
 use crate::failure::Failure;
+use crate::scene::CometPreparationKeys;
 use crate::scene::world::Materials;
-use crate::scene::{CometKeys, CometPreparationKeys, LawKeys};
-use colluvium_dem::preparation::{
-    Aggregate, CentralCompaction, Growth, Packing, Relaxation, Rest, Weight,
-};
-use colluvium_dem::{Grain, Normal};
+use colluvium_dem::preparation::{CentralCompaction, Relaxation, Rest};
 use nalgebra::{UnitQuaternion, Vector3};
-use rand::{RngExt, SeedableRng};
-use rand_chacha::ChaCha8Rng;
-use std::collections::BTreeMap;
 use std::f64::consts::PI;
 
-/// Factor by which grains are made stiffer at a time.
-const STIFFER: f64 = 2.0;
-/// Time of a stage over the time in which two mean grains part, √(m d/F_c) √(depth/d).
-const OSCILLATIONS: f64 = 60.0;
 /// Drag of the pulled grains, over √(a/d): they come in slowly, so that the pull can be taken off in time.
 const DRAG: f64 = 3.0;
 /// Ball in which the solid fraction is measured, over the one that is needed.
@@ -44,78 +23,19 @@ const PROBE: f64 = 0.8;
 #[derive(Clone, Copy, Debug)]
 pub struct CometBall<'a> {
     /// The material.
-    pub material: &'a CometKeys,
+    pub comet: Comet<'a>,
     /// How it is put together.
     pub preparation: &'a CometPreparationKeys,
-    /// The contact law.
-    pub contact: &'a LawKeys,
-    /// Size of parcels over that of grains.
-    pub coarse_graining: f64,
     /// Radius that is needed (m).
     pub radius: f64,
 }
 
-/// Mean diameter by number (m).
-pub fn diameter(materials: &Materials) -> f64 {
-    2.0 * materials.ingredients[0].sizes.mean()
-}
-
-/// Pull-off force of two mean grains (N).
-pub fn pull_off(materials: &Materials) -> f64 {
-    let reduced = 0.25 * diameter(materials);
-    materials.first_law().cohesion.force(reduced)
-}
-
-/// Rest of grains that nothing but their cohesion moves: its acceleration is the unit. Contacts at rest
-/// carry nothing, so their forces are no measure.
-pub fn relaxation(materials: &Materials) -> Relaxation {
-    let first = &materials.ingredients[0];
-    let mass = first.density * PI / 6.0 * diameter(materials).powi(3);
-    Relaxation {
-        rest: Rest {
-            kinetic: 1e-7,
-            unbalanced: 1e9,
-        },
-        ..Relaxation::under(pull_off(materials) / mass)
-    }
-}
-
-/// Depth at which two mean grains of Hertz' law rest under their cohesion, over their diameter.
-fn depth(materials: &Materials) -> f64 {
-    let d = diameter(materials);
-    match materials.first_law().normal {
-        Normal::Hertz(hertz) => {
-            let reduced: f64 = 0.25 * d;
-            let force = pull_off(materials);
-            (0.75 * force / (hertz.effective_modulus * reduced.sqrt())).powf(2.0 / 3.0) / d
-        }
-        _ => 0.0,
-    }
-}
-
 impl CometBall<'_> {
-    /// Rumpf's strength (Pa); the same for grains and for parcels.
-    pub fn rumpf(&self, materials: &Materials) -> f64 {
-        let solid = self.material.solid_fraction();
-        let d = diameter(materials);
-        1.1 * solid / (1.0 - solid) * pull_off(materials) / (d * d)
-    }
-
-    /// Mean grains that a volume of the material holds (m³).
-    pub fn grains_in(&self, volume: f64, materials: &Materials) -> f64 {
-        let sizes = &materials.ingredients[0].sizes;
-        let mut random = ChaCha8Rng::seed_from_u64(0);
-        let draws = 4000;
-        let cubes: f64 = (0..draws).map(|_| sizes.draw(&mut random).powi(3)).sum();
-        let mean = 4.0 / 3.0 * PI * cubes / f64::from(draws);
-        debug_assert!(sizes.weight == Weight::Number);
-        self.material.solid_fraction() * volume / mean
-    }
-
     /// Grains of the whole ball.
     pub fn grains(&self, materials: &Materials) -> usize {
         let radius = self.preparation.margin * self.radius;
-        self.grains_in(4.0 / 3.0 * PI * radius.powi(3), materials)
+        self.comet
+            .grains_in(4.0 / 3.0 * PI * radius.powi(3), materials)
             .ceil() as usize
     }
 
@@ -126,87 +46,24 @@ impl CometBall<'_> {
         center: Vector3<f64>,
         origin: &str,
     ) -> Result<(), Failure> {
-        let stiff = self.contact.youngs_modulus.unwrap_or_default();
-        let mut modulus = self.preparation.youngs_modulus;
-        let soft = self.at_stiffness(modulus, origin)?;
-        let first = &soft.ingredients[0];
-        shop.grow(&Aggregate {
-            growth: Growth::ParticleCluster,
-            grains: self.grains(&soft),
-            sizes: first.sizes.clone(),
-            density: first.density,
-            material: first.material,
-            overlap: 0.5 * depth(&soft),
-            seed: shop.seed,
-        })?;
-        self.mix(&soft, &mut shop.packing, shop.seed);
+        let soft = self
+            .comet
+            .at_stiffness(self.comet.soft.youngs_modulus, origin)?;
+        self.comet.grow(shop, &soft, self.grains(&soft))?;
         self.compact(shop, &soft)?;
-        let mut stages = 0;
-        while modulus < stiff {
-            modulus = (STIFFER * modulus).min(stiff);
-            let materials = self.at_stiffness(modulus, origin)?;
-            let unit = relaxation(&materials).acceleration;
-            let time = OSCILLATIONS * (diameter(&materials) * depth(&materials) / unit).sqrt();
-            shop.let_go(&Surroundings::none(materials.laws), time)?;
-            stages += 1;
-        }
-        shop.note(
-            "stiffen",
-            format!(
-                "E from {:.3e} to {stiff:.3e} Pa in {stages} stages",
-                self.preparation.youngs_modulus
-            ),
-        );
-        let own = relaxation(shop.materials);
-        shop.relax(&self.last(origin)?, &own)?;
+        self.comet.stiffen(shop, origin)?;
         shop.place(UnitQuaternion::identity(), center)
     }
 
-    /// The law under which a preparation ends: as stiff as the scene's own, with the preparation's
-    /// restitution, so that the packing does not depend on the restitution that is tested.
-    pub fn last(&self, origin: &str) -> Result<Surroundings, Failure> {
-        let stiff = self.contact.youngs_modulus.unwrap_or_default();
-        let materials = self.at_stiffness(stiff, origin)?;
-        Ok(Surroundings::none(materials.laws))
-    }
-
-    /// The materials while the ball is made, at this E (Pa).
-    fn at_stiffness(&self, modulus: f64, origin: &str) -> Result<Materials, Failure> {
-        let keys = self.preparation.contact(self.contact, modulus);
-        let none = BTreeMap::new();
-        Ok(self
-            .material
-            .materials(&keys, &none, self.coarse_graining, origin)?)
-    }
-
-    /// Gives grains their materials, so that the parts by volume are met to one grain.
-    fn mix(&self, materials: &Materials, packing: &mut Packing, seed: u64) {
-        let mut random = ChaCha8Rng::seed_from_u64(seed ^ MIXING);
-        let mut order: Vec<usize> = (0..packing.grains.len()).collect();
-        for k in (1..order.len()).rev() {
-            order.swap(k, random.random_range(0..=k));
-        }
-        let mut filled = vec![0.0; materials.ingredients.len()];
-        for k in order {
-            let behind = |i: &usize| filled[*i] / materials.ingredients[*i].parts_by_volume;
-            let next = (0..filled.len()).min_by(|a, b| behind(a).total_cmp(&behind(b)));
-            let Some(i) = next else { continue };
-            let grain: &mut Grain = &mut packing.grains[k];
-            filled[i] += grain.volume();
-            grain.material = materials.ingredients[i].material;
-            grain.density = materials.ingredients[i].density;
-        }
-    }
-
     fn compact(&self, shop: &mut Workshop, soft: &Materials) -> Result<(), Failure> {
-        let rumpf = self.rumpf(soft);
+        let rumpf = self.comet.rumpf(soft);
         // The pull lays ρ a R on the middle of the ball.
         let acceleration =
-            self.preparation.pull * rumpf / (self.material.bulk_density * self.radius);
+            self.preparation.pull * rumpf / (self.comet.material.bulk_density * self.radius);
         let spec = CentralCompaction {
             center: Vector3::zeros(),
             probe: PROBE * self.radius,
-            solid_fraction: self.material.solid_fraction(),
+            solid_fraction: self.comet.material.solid_fraction(),
             tolerance: 0.02,
             accelerations: [acceleration, 1000.0 * acceleration],
             relaxation: Relaxation {
@@ -226,6 +83,3 @@ impl CometBall<'_> {
         shop.compact(&around, &spec)
     }
 }
-
-/// Sets the shuffle of materials apart from the growth.
-const MIXING: u64 = 0x6d69_7865;

@@ -91,7 +91,9 @@ impl BoulderScene {
 
     pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {
         self.material.check_together(origin)?;
-        self.preparation.check_together(&self.contact, origin)?;
+        self.preparation
+            .softness()
+            .check_together(&self.contact, origin)?;
         self.materials(origin)?;
         let widest = self.coarse_graining * self.material.largest_diameter;
         if 4.0 * widest > self.diameter {

@@ -102,11 +102,69 @@ pub struct CometPreparationKeys {
 }
 
 impl CometPreparationKeys {
-    /// The law in which the ball is made, at this E (Pa).
+    /// What grains are like meanwhile.
+    pub fn softness(&self) -> Softness {
+        Softness {
+            youngs_modulus: self.youngs_modulus,
+            restitution: self.restitution,
+            friction: None,
+        }
+    }
+}
+
+/// How a block of the material is made.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CometBlockKeys {
+    /// E while grains are pressed together (Pa): soft grains allow long steps; then it is raised in steps.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e13))]
+    pub youngs_modulus: f64,
+    /// Restitution while the block is made.
+    #[schemars(extend("minimum" = 0.01, "maximum" = 1.0))]
+    pub restitution: f64,
+    /// Friction and rolling friction while the block is made: the less, the more contacts it ends with.
+    #[schemars(extend("minimum" = 0.0, "maximum" = 10.0))]
+    pub friction: f64,
+    /// Speed at which neighbours close in at the end (m/s).
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0))]
+    pub speed: f64,
+    /// Material around what is cut out of the block, in mean diameters of parcels.
+    #[schemars(extend("minimum" = 0.0, "maximum" = 100.0))]
+    pub margin: f64,
+}
+
+impl CometBlockKeys {
+    /// What grains are like meanwhile.
+    pub fn softness(&self) -> Softness {
+        Softness {
+            youngs_modulus: self.youngs_modulus,
+            restitution: self.restitution,
+            friction: Some(self.friction),
+        }
+    }
+}
+
+/// What grains are like while they are put in place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Softness {
+    /// E (Pa), below that of the scene's law.
+    pub youngs_modulus: f64,
+    /// Restitution.
+    pub restitution: f64,
+    /// Friction and rolling friction, where they are not those of the scene's law.
+    pub friction: Option<f64>,
+}
+
+impl Softness {
+    /// The law in which grains are put in place, at this E (Pa).
     pub fn contact(&self, contact: &LawKeys, youngs_modulus: f64) -> LawKeys {
         LawKeys {
             youngs_modulus: Some(youngs_modulus),
             restitution: Some(self.restitution),
+            friction: contact.friction.map(|own| self.friction.unwrap_or(own)),
+            rolling_friction: contact
+                .rolling_friction
+                .map(|own| self.friction.unwrap_or(own)),
             ..*contact
         }
     }
