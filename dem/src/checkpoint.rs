@@ -72,7 +72,11 @@ impl Simulation {
         numbers("list/row_drift", flatten(&drifts));
         numbers("list/travel", self.list.travel.clone());
         let levels = self.list.levels.iter();
-        let grids = levels.flat_map(|l| [l.grid.origin, l.grid.inverse_cell, [l.radius, 0.0, 0.0]]);
+        let axes = |grid: &Grid| [grid.along, grid.across[1]].map(|axis| axis as f64);
+        let grids = levels.flat_map(|l| {
+            let [along, slow] = axes(&l.grid);
+            [l.grid.origin, l.grid.inverse_cell, [l.radius, along, slow]]
+        });
         numbers("list/grid", grids.flatten().collect());
         numbers("list/skin", vec![self.skin, self.hold]);
         numbers("list/age", vec![self.list.age]);
@@ -215,17 +219,24 @@ impl Simulation {
         let grids = sized("list/grid", 9 * cells.len())?.as_chunks::<9>().0;
         let mut levels = Vec::new();
         let mut first_row: usize = 0;
-        for (cells, &[x, y, z, u, v, w, radius, ..]) in cells.iter().zip(grids) {
-            let mut grid = Grid {
+        for (cells, &[x, y, z, u, v, w, radius, along, slow]) in cells.iter().zip(grids) {
+            let axes = [along, slow].map(|axis| (0..3).find(|&a| a as f64 == axis));
+            let [Some(along), Some(slow)] = axes else {
+                return Err("array `list/grid` names axes that there are not".into());
+            };
+            let Some(fast) = (0..3).find(|&a| a != along && a != slow && along != slow) else {
+                return Err("array `list/grid` names an axis twice".into());
+            };
+            let grid = Grid {
                 origin: [x, y, z],
                 inverse_cell: [u, v, w],
                 cells: cells.map(|c| c as usize),
                 periodic: self.domain.periodic,
-                across: [1, 2],
+                along,
+                across: [fast, slow],
             };
-            grid.order_axes();
-            let [_, ny, nz] = grid.cells;
-            let rows = ny.checked_mul(nz).filter(|&r| r > 0 && r <= ends.len());
+            let [m, s] = grid.across.map(|axis| grid.cells[axis]);
+            let rows = m.checked_mul(s).filter(|&r| r > 0 && r <= ends.len());
             let rows = rows.ok_or("array `list/cells` does not fit `list/row_end`")?;
             levels.push(Level::restored(
                 grid,

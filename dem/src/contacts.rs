@@ -4,6 +4,7 @@ use crate::grains::Grains;
 use crate::population::GONE;
 use crate::reach::Reach;
 use crate::simulation::Layout;
+use crate::team::Team;
 use std::ops::Range;
 
 /// Touching contacts by their lower grain.
@@ -30,11 +31,12 @@ impl Touching {
         reach: &mut Reach,
         grains: &mut Grains,
         layout: Layout,
+        team: &Team,
         place: &dyn Fn(u32) -> u32,
     ) {
         let (width, n) = (layout.history, grains.len());
         self.open(width, n, &mut grains.spare);
-        reach.compact(width);
+        reach.compact(width, team);
         reach.compacted(width, |i, j, _| {
             let (i, j) = (place(i), place(j));
             if i != GONE && j != GONE {

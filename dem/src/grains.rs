@@ -49,7 +49,8 @@ impl Grain {
 /// Moment of inertia of a sphere is this times m R².
 pub(crate) const SPHERE_INERTIA: f64 = 0.4;
 
-/// Structure of rows. One dummy grain without size or mass follows the last one: it pads batches.
+/// Structure of rows. One dummy grain without size or mass follows the last one: it pads batches. Copies of
+/// grains may follow it (`reach.rs`).
 ///
 /// The fourth number of a row is what a contact needs as a *sum* over its two grains, so that one
 /// addition combines both sides before rows become lanes.
@@ -111,7 +112,28 @@ impl Grains {
         self.pad();
     }
 
-    /// Takes the dummy away.
+    /// Makes room behind the dummy for copies of so many grains.
+    pub fn lay_ghosts(&mut self, ghosts: usize) {
+        let rows = self.len() + 1 + ghosts;
+        for copies in [&mut self.place, &mut self.motion, &mut self.turn] {
+            lay(copies, rows, [0.0; 4]);
+        }
+        lay(&mut self.material, rows, 0);
+    }
+
+    /// Copies grains to rows behind the dummy.
+    pub fn copy_ghosts(&mut self, grains: &[u32], first: usize) {
+        for rows in [&mut self.place, &mut self.motion, &mut self.turn] {
+            for (ghost, &grain) in grains.iter().enumerate() {
+                rows[first + ghost] = rows[grain as usize];
+            }
+        }
+        for (ghost, &grain) in grains.iter().enumerate() {
+            self.material[first + ghost] = self.material[grain as usize];
+        }
+    }
+
+    /// Takes the dummy away, and what is behind it.
     fn unpad(&mut self) {
         let n = self.len();
         self.place.truncate(n);
@@ -163,6 +185,15 @@ impl Grains {
             (*mass, *id, *material) = (room[0], room[1] as u32, room[2] as u16);
         }
     }
+}
+
+/// Makes it so many; a little more room than that, since the next time there may be more.
+fn lay<T: Copy>(values: &mut Vec<T>, count: usize, value: T) {
+    if values.capacity() < count {
+        let more = count + count / 64 - values.len();
+        values.reserve_exact(more);
+    }
+    values.resize(count, value);
 }
 
 fn thin<T>(values: &mut Vec<T>, goes: &[bool]) {

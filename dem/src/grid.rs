@@ -4,18 +4,24 @@ use crate::domain::Domain;
 
 /// Cells no narrower than a contact of two of the level's grains plus the skin.
 ///
-/// All cells with the same numbers along two of the axes form a *row* along x. Of these two, the one
-/// with more cells counts slowest: layers are then small, and with them the share of grains whose
-/// neighbours are far away in memory.
+/// All cells with the same numbers along two of the axes form a *row*, along x or y: what flows mostly does so
+/// at one speed in a horizontal row. Of the two axes across, the one with more cells counts slowest: layers
+/// are then small, and with them the share of grains whose neighbours are far away in memory. Where that makes
+/// layers much smaller, rows lie along y: a box that is long along x is cut into slices of it.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Grid {
     pub origin: [f64; 3],
     pub inverse_cell: [f64; 3],
     pub cells: [usize; 3],
     pub periodic: [bool; 3],
+    /// The axis along rows.
+    pub along: usize,
     /// The axes across rows, the slow one last.
     pub across: [usize; 2],
 }
+
+/// How much smaller layers must become for rows to lie along y.
+const WORTH_TURNING: usize = 2;
 
 impl Grid {
     /// A grid for `n` grains between `low` and `high`, with cells of at least `reach`.
@@ -44,17 +50,27 @@ impl Grid {
             }
             stretch *= 1.5;
         }
-        grid.order_axes();
+        grid.order_axes(false);
         grid
     }
 
-    /// Decides which axis counts slowest.
-    pub fn order_axes(&mut self) {
-        self.across = if self.cells[1] > self.cells[2] {
-            [2, 1]
+    /// Decides which axis counts fastest and which slowest; rows lie along x where images are shifted along it.
+    pub fn order_axes(&mut self, shifted: bool) {
+        let [x, y, z] = self.cells;
+        let layers = [x * y.min(z), y * x.min(z)];
+        let turned = !shifted && WORTH_TURNING * layers[1] < layers[0];
+        let [a, b] = if turned { [0, 2] } else { [1, 2] };
+        self.along = usize::from(turned);
+        self.across = if self.cells[a] > self.cells[b] {
+            [b, a]
         } else {
-            [1, 2]
+            [a, b]
         };
+    }
+
+    /// Number of cells of a row.
+    pub fn row_cells(&self) -> usize {
+        self.cells[self.along]
     }
 
     /// Whether the last layer of rows is next to the first.
@@ -84,10 +100,10 @@ impl Grid {
         (c.max(0.0) as usize).min(self.cells[axis] - 1)
     }
 
-    /// Number of the cell that holds a point: x counts fastest.
+    /// Number of the cell that holds a point.
     pub fn index(&self, x: &[f64; 4]) -> usize {
         let across = self.across.map(|axis| self.coordinate(axis, x[axis]));
-        self.row_at(across) * self.cells[0] + self.coordinate(0, x[0])
+        self.row_at(across) * self.row_cells() + self.coordinate(self.along, x[self.along])
     }
 
     /// Distinct cell numbers along an axis from `reach` cells before `from` to as many after `to`.

@@ -350,7 +350,7 @@ impl Simulation {
         }
         let cell = self.cell();
         for (chunk, k) in self.reach.pairs() {
-            let (i, j) = (chunk.i[k] as usize, chunk.j[k] as usize);
+            let [i, j] = chunk.pair(k);
             let slot = &chunk.slots[k * rows..][..rows];
             if slot.iter().flatten().all(|x| *x == 0.0) {
                 continue;

@@ -48,6 +48,11 @@ impl Loads {
         self.rows.get(grain)
     }
 
+    /// Whether there are none.
+    pub fn is_empty(&self) -> bool {
+        self.rows.is_empty()
+    }
+
     /// Finds the grains again after they have been sorted; loads of grains that have gone are dropped.
     fn settle(&mut self, places: &Places) {
         self.given.retain(|load| places.of(load.grain) != GONE);

@@ -1,4 +1,4 @@
-//! Moving a grain: it gathers its slots, is kicked and drifts.
+//! Moving a grain: it is kicked by the sum of its forces and drifts.
 //!
 //! ```text
 //! v(n+1/2) = v(n-1/2) + dt (F(n)/m + g)        x(n+1) = x(n) + dt v(n+1/2)
@@ -10,7 +10,6 @@
 //! Order of a grain's sum: its pairs in the order of the Verlet list, which are those as `j` by rising
 //! `i` and then those as `i`, then walls, then loads.
 
-use crate::chunk::Chunk;
 use crate::grains::SPHERE_INERTIA;
 use crate::lanes::{Lanes4, Portable};
 use crate::loads::Loads;
@@ -22,26 +21,6 @@ use crate::walls::WallContacts;
 pub(crate) struct Sum<L>(pub [L; 3]);
 
 impl<L: Lanes4> Sum<L> {
-    /// Sum over all pairs of shared grain `s` of a chunk.
-    #[inline(always)]
-    pub fn import(chunks: &[Chunk], chunk: &Chunk, s: usize, rows: usize) -> Self {
-        let end = match chunk.shared.get(s + 1) {
-            Some(next) => next.first_import as usize,
-            None => chunk.imports.len(),
-        };
-        let mut sum = Sum([L::splat(0.0); 3]);
-        for import in &chunk.imports[chunk.shared[s].first_import as usize..end] {
-            let exports = &chunks[import.chunk as usize].exports;
-            let slot = Sum::load(&exports[import.export as usize * rows..][..rows]);
-            if import.other {
-                sum.subtract(&slot);
-            } else {
-                sum.add(&slot);
-            }
-        }
-        sum
-    }
-
     /// Adds the walls.
     #[inline(always)]
     pub fn lean(&mut self, walls: &WallContacts, grain: usize) {
@@ -150,12 +129,11 @@ pub(crate) fn total(
         sum.store(total);
     };
     for (chunk, place) in reach.pairs() {
-        if chunk.touches(place) == 1 {
+        if chunk.touches(place) {
             let slot = Sum::load(&chunk.slots[place * rows..][..rows]);
-            change(&mut totals[chunk.i[place] as usize], &|sum| sum.add(&slot));
-            change(&mut totals[chunk.j[place] as usize], &|sum| {
-                sum.subtract(&slot);
-            });
+            let [i, j] = chunk.pair(place);
+            change(&mut totals[i], &|sum| sum.add(&slot));
+            change(&mut totals[j], &|sum| sum.subtract(&slot));
         }
     }
     for (g, total) in totals.iter_mut().enumerate() {

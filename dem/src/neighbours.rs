@@ -2,14 +2,14 @@
 //!
 //! Grains are sorted into *levels* by size, a factor of two each and the finest first, so that a few
 //! large grains do not widen the cells of all small ones. Within a level they are kept sorted by
-//! cell, x fastest. All cells along x form a *row*: a contiguous range of grains. Grains of one level
+//! cell. All cells along one axis form a *row* (`grid.rs`): a contiguous range of grains. Grains of one level
 //! find each other in their own grid; each grain finds larger ones in the coarser grids, whose cells
 //! are wide enough. Grains of similar size make one level.
 //!
 //! The list holds all pairs closer than `R_i + R_j + skin`, each once, i < j, ordered by i; it is valid
 //! as long as no two grains can have approached by more than the skin: see `validity.rs`.
 
-use crate::domain::{Cell, Domain, Images};
+use crate::domain::{Cell, Images};
 use crate::grains::Grains;
 use crate::grid::Grid;
 use crate::validity::{Allowance, Watch};
@@ -79,7 +79,7 @@ struct Part {
     rows: Range<usize>,
     counts: Vec<u32>,
     partner: Vec<u32>,
-    /// Cells around, along x and the two axes across.
+    /// Cells around, along rows and the two axes across.
     around: [Vec<usize>; 3],
 }
 
@@ -88,6 +88,9 @@ const ROWS_A_PART: usize = 16;
 
 /// Parts that each thread works on between two times of putting results together.
 const PARTS_A_THREAD: usize = 8;
+
+/// Pairs of a grain that room is made for at first: pages that are never written take no memory.
+const PAIRS_EXPECTED: usize = 6;
 
 /// More levels than a size ratio of a million needs.
 const LEVELS: usize = 24;
@@ -100,7 +103,7 @@ impl Neighbours {
             let (wrapped, _) = cell.wrap(crate::grains::vector(x));
             (x[0], x[1], x[2]) = (wrapped.x, wrapped.y, wrapped.z);
         }
-        self.sort(grains, &cell.domain, skin);
+        self.sort(grains, cell, skin);
         self.lay_rows(grains);
         self.find_pairs(grains, cell, skin, parallel);
         self.age = 0.0;
@@ -116,6 +119,11 @@ impl Neighbours {
     /// Partners j > i of grain i.
     pub fn partners(&self, i: usize) -> &[u32] {
         &self.partner[self.first[i] as usize..self.first[i + 1] as usize]
+    }
+
+    /// How many pairs have their lower grain among these.
+    pub fn count(&self, grains: &Range<usize>) -> usize {
+        (self.first[grains.end] - self.first[grains.start]) as usize
     }
 
     /// Where a grain of the previous order stands now.
@@ -137,7 +145,8 @@ impl Neighbours {
     }
 
     /// Lays the levels' grids.
-    fn lay_levels(&mut self, grains: &Grains, domain: &Domain, skin: f64) -> Sizes {
+    fn lay_levels(&mut self, grains: &Grains, cell: &Cell, skin: f64) -> Sizes {
+        let domain = &cell.domain;
         let place = &grains.place[..grains.len()];
         let (mut low, mut high) = ([f64::INFINITY; 3], [f64::NEG_INFINITY; 3]);
         let (mut smallest, mut largest) = (f64::INFINITY, 0.0_f64);
@@ -166,7 +175,12 @@ impl Neighbours {
         let (mut first_cell, mut first_row) = (0, 0);
         for class in (0..LEVELS).rev().filter(|&c| count[c] > 0) {
             let reach = 2.0 * radius[class] + skin;
-            let grid = Grid::lay(count[class], [low, high], domain, reach);
+            let mut grid = Grid::lay(count[class], [low, high], domain, reach);
+            match self.levels.first() {
+                // All levels count their axes alike, so that their rows can be dealt out together.
+                Some(finest) => (grid.along, grid.across) = (finest.grid.along, finest.grid.across),
+                None => grid.order_axes(Images::of(cell).sheared().is_some()),
+            }
             sizes.level[class] = self.levels.len();
             let (cells, rows) = (grid.cells.iter().product::<usize>(), grid.rows());
             self.levels.push(Level {
@@ -183,8 +197,8 @@ impl Neighbours {
         sizes
     }
 
-    fn sort(&mut self, grains: &mut Grains, domain: &Domain, skin: f64) {
-        let sizes = self.lay_levels(grains, domain, skin);
+    fn sort(&mut self, grains: &mut Grains, cell: &Cell, skin: f64) {
+        let sizes = self.lay_levels(grains, cell, skin);
         let n = grains.len();
         let b = &mut self.build;
         let cells = self.levels.iter().map(|l| l.count).sum::<usize>();
@@ -220,7 +234,7 @@ impl Neighbours {
     fn lay_rows(&mut self, grains: &Grains) {
         self.rows.clear();
         for level in &self.levels {
-            let nx = level.grid.cells[0];
+            let nx = level.grid.row_cells();
             for row in 0..level.grid.rows() {
                 let cell = level.first_cell + row * nx;
                 let start = self.build.cell_first[cell];
@@ -285,8 +299,10 @@ impl Neighbours {
         // A few parts at a time, so that pairs are not held twice.
         parts.resize_with((PARTS_A_THREAD * threads).max(1), Part::default);
         self.first.clear();
+        self.first.reserve_exact(grains.len() + 1);
         self.first.push(0);
         self.partner.clear();
+        self.partner.reserve_exact(PAIRS_EXPECTED * grains.len());
         let finder = Finder {
             levels: &self.levels,
             first: &self.build.cell_first,
@@ -304,6 +320,12 @@ impl Neighbours {
                 parts.par_iter_mut().for_each(|part| finder.search(part));
             } else {
                 parts.iter_mut().for_each(|part| finder.search(part));
+            }
+            let found = parts.iter().map(|part| part.partner.len()).sum::<usize>();
+            if self.partner.capacity() - self.partner.len() < found {
+                // Growing by doubling would take twice what is needed.
+                self.partner
+                    .reserve_exact(found.max(self.partner.len() / 8));
             }
             for part in &parts {
                 for &count in &part.counts {
@@ -353,10 +375,10 @@ impl Finder<'_> {
             let level = &self.levels[l];
             let across = level.grid.row(row - level.first_row);
             level.around_row(across, &mut part.around);
-            let nx = level.grid.cells[0];
+            let (nx, along) = (level.grid.row_cells(), level.grid.along);
             let cell = level.first_cell + (row - level.first_row) * nx;
             for x in 0..nx {
-                level.grid.around(0, [x, x], 1, &mut part.around[0]);
+                level.grid.around(along, [x, x], 1, &mut part.around[0]);
                 for i in self.first[cell + x]..self.first[cell + x + 1] {
                     let before = part.partner.len();
                     self.scan(level, i, &part.around, &mut part.partner);
@@ -365,8 +387,8 @@ impl Finder<'_> {
                         let at = &self.grains.place[i as usize];
                         // The cells of its own level are needed again.
                         level.around_row(across, &mut part.around);
-                        let x = level.grid.coordinate(0, at[0]);
-                        level.grid.around(0, [x, x], 1, &mut part.around[0]);
+                        let x = level.grid.coordinate(along, at[along]);
+                        level.grid.around(along, [x, x], 1, &mut part.around[0]);
                     }
                     part.counts.push((part.partner.len() - before) as u32);
                 }
@@ -380,15 +402,15 @@ impl Finder<'_> {
             let grid = &coarse.grid;
             let across = grid.across.map(|axis| grid.coordinate(axis, at[axis]));
             coarse.around_row(across, &mut part.around);
-            let x = grid.coordinate(0, at[0]);
-            grid.around(0, [x, x], 1, &mut part.around[0]);
+            let x = grid.coordinate(grid.along, at[grid.along]);
+            grid.around(grid.along, [x, x], 1, &mut part.around[0]);
             self.scan(coarse, i, &part.around, &mut part.partner);
         }
     }
 
     /// Lists the grains behind i in cells of a level.
     fn scan(&self, level: &Level, i: u32, around: &[Vec<usize>; 3], partner: &mut Vec<u32>) {
-        let nx = level.grid.cells[0];
+        let nx = level.grid.row_cells();
         let xi = &self.grains.place[i as usize];
         for &slow in &around[2] {
             for &fast in &around[1] {
@@ -468,7 +490,7 @@ impl Level {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::Grain;
+    use crate::{Domain, Grain};
     use nalgebra::Vector3;
     use rand::{RngExt, SeedableRng};
     use rand_chacha::ChaCha8Rng;

@@ -79,7 +79,7 @@ impl Simulation {
         into.contacts.clear();
         let (rows, cell) = (self.slot_rows(), self.cell());
         for (chunk, k) in self.reach.pairs() {
-            let (i, j) = (chunk.i[k] as usize, chunk.j[k] as usize);
+            let [i, j] = chunk.pair(k);
             let (a, b) = (&self.grains.place[i], &self.grains.place[j]);
             let (apart, _) = cell.nearest(vector(a) - vector(b));
             let (distance, radii) = (apart.norm(), a[3] + b[3]);
@@ -137,7 +137,7 @@ impl Simulation {
         }
         let (width, cell) = (self.layout.history, self.cell());
         for (chunk, k) in self.reach.pairs() {
-            let (i, j) = (chunk.i[k] as usize, chunk.j[k] as usize);
+            let [i, j] = chunk.pair(k);
             let (a, b) = (&self.grains.place[i], &self.grains.place[j]);
             let apart = cell.nearest(vector(a) - vector(b)).0.norm();
             let history = self.history_of(chunk, k);
@@ -303,19 +303,19 @@ impl Simulation {
             .reach
             .pairs()
             .map(|(chunk, k)| {
-                let (i, j) = (chunk.i[k] as usize, chunk.j[k] as usize);
+                let [i, j] = chunk.pair(k);
                 (self.grains.id[i], self.grains.id[j], chunk, k)
             })
             .collect();
         contacts.sort_by_key(|&(a, b, ..)| (a.min(b), a.max(b)));
         for (a, b, chunk, k) in contacts {
-            let block = &chunk.history[k / 4 * width..][..width];
+            let history = self.history_of(chunk, k);
             // Pairs within reach that do not touch are an accident of the lists.
-            if block.iter().all(|row| row[k % 4] == 0.0) {
+            if history.iter().all(|&h| h == 0.0) {
                 continue;
             }
             hash.take(u64::from(a) << 32 | u64::from(b));
-            block.iter().for_each(|row| hash.take(row[k % 4].to_bits()));
+            history[..width].iter().for_each(|h| hash.take(h.to_bits()));
         }
         let mut walls: Vec<_> = self.wall_contacts.touching().collect();
         walls.sort_by_key(|c| (self.grains.id[c.grain as usize], c.wall));

@@ -26,7 +26,8 @@ use crate::reach::Reach;
 use crate::rows::Rows;
 use crate::setup::{Setup, SetupError, Threads};
 use crate::snapshot::GrainSample;
-use crate::sweep::{self, Moved, Pass, Sweep};
+use crate::sweep::{self, Pass, Sweep};
+use crate::team::OwnTeam;
 use crate::walls::{Course, Scene, Span, Standing, Wall, WallContacts};
 use lists::{LayoutOf, SKIN, hold_of, skin_of};
 use nalgebra::Vector3;
@@ -58,6 +59,7 @@ pub struct Simulation {
     pub(crate) walls: Vec<Standing>,
     pub(crate) timestep: f64,
     pub(crate) parallel: bool,
+    team: OwnTeam,
     /// Registers that steps use; all give the same bits.
     pub(crate) width: Width,
     pub(crate) skin: f64,
@@ -144,6 +146,7 @@ impl Simulation {
             bodies,
             timestep: setup.timestep,
             parallel: setup.threads == Threads::Rayon,
+            team: OwnTeam::default(),
             width: Width::widest(),
             skin,
             grains: Grains::new(&setup.grains),
@@ -179,11 +182,13 @@ impl Simulation {
 
     /// Integrates `steps` steps.
     pub fn advance(&mut self, steps: u64) -> Result<(), Diverged> {
-        if self.parallel && rayon::current_thread_index().is_none() {
-            // From outside the pool every split of a step would be handed over: enter it once.
-            return rayon::scope(|_| self.advance_here(steps));
-        }
-        self.advance_here(steps)
+        let helpers = if self.parallel {
+            self.reach.chunks.len().min(rayon::current_num_threads()) - 1
+        } else {
+            0
+        };
+        let team = self.team.share();
+        team.with_helpers(helpers, || self.advance_here(steps))
     }
 
     fn advance_here(&mut self, steps: u64) -> Result<(), Diverged> {
@@ -277,6 +282,7 @@ impl Simulation {
         };
         self.springs_current = true;
         let lever = self.law.lever();
+        let team = self.team.share();
         let mut walls = if pass == Pass::Motion {
             0.0
         } else {
@@ -285,6 +291,8 @@ impl Simulation {
                 domain: &self.domain,
                 lever,
                 step,
+                threads: self.reach.chunks.len(),
+                team: &team,
             };
             self.wall_contacts.evaluate(law, &mut self.walls, &scene)
         };
@@ -298,16 +306,26 @@ impl Simulation {
         }
         let (g, images) = (self.gravity, Images::of(&self.cell()));
         let grains = &mut self.grains;
-        // SAFETY: a sweep writes the rows of each chunk on one thread, those of grains that other
-        // chunks read after all of them are through (`sweep.rs`).
-        let rows = unsafe { Rows::of(&mut grains.place, &mut grains.motion, &mut grains.turn) };
+        // SAFETY: a sweep moves the grains of each chunk, and writes what is theirs, on one thread; other
+        // chunks read copies, which are made before anything is moved (`sweep.rs`).
+        let rows = unsafe {
+            Rows::of(
+                &mut grains.place,
+                &mut grains.motion,
+                &mut grains.turn,
+                &mut self.fastest,
+                &mut self.taken,
+            )
+        };
         let sweep = Sweep {
             pass,
             width: self.width,
             parallel: self.parallel && self.reach.parallel,
+            team: &team,
             field: Field {
                 rows,
                 material: &grains.material,
+                dummy: grains.id.len() as u32,
                 images,
                 lever,
                 hold: self.hold,
@@ -324,12 +342,7 @@ impl Simulation {
             },
             fixed: &self.fixed,
         };
-        let moved = Moved {
-            first: [0; 2],
-            fastest: &mut self.fastest,
-            taken: &mut self.taken,
-        };
-        let pairs = sweep::run(law, &sweep, &mut self.reach.chunks, moved);
+        let pairs = sweep::run(law, &sweep, &mut self.reach.chunks);
         pairs.max(walls)
     }
 
@@ -497,9 +510,7 @@ impl Simulation {
         if parallel != self.parallel {
             self.parallel = parallel;
             self.forget_observation();
-            let (reach, grains) = (&mut self.reach, &mut self.grains);
-            self.touching.collect(reach, grains, self.layout, &|i| i);
-            self.make_reach(true);
+            self.deal_anew();
         }
     }
 }

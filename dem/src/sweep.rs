@@ -1,24 +1,27 @@
 //! A step: forces and motion in one sweep over the grains.
 //!
-//! Pairs are ordered by their lower grain i. A block of grains at a time, all pairs with i in the block
-//! are evaluated into *slots*, those that touch are added to the sums of both grains in their order,
-//! and the block's grains, which then have all their forces, are moved while their rows are in the
-//! cache. Slots live for a block; sums from the first pair of a grain until it is moved, in a ring.
+//! Pairs are ordered by their lower grain i. A block of grains at a time, the pairs with i in the block that
+//! touch are evaluated and added to the sums of both grains, and the block's grains, which then have all
+//! their forces, are moved while their rows are in the cache. Sums live from the first pair of a grain until
+//! it is moved, in a ring.
 //!
-//! **Threads.** Each chunk is swept on its own. A grain that is partner in a pair of an earlier chunk
-//! is *shared* (`links.rs`): it is moved after all chunks are through, from copies of its slots. So
-//! rows are moved in place, although chunks read rows of later ones: only those of shared grains. The
-//! order of every sum is the same for any cuts.
+//! **Threads.** Each chunk is swept on its own. Rows that it reads of other chunks' grains are copied before
+//! any grain is moved, so that rows are moved in place. Pairs of grains of two chunks are evaluated by both,
+//! each for its own grain, from the same numbers. The order of every sum is the same for any cuts.
 
-use crate::chunk::{BLOCK, Chunk, End};
-use crate::contact::Interaction;
-use crate::forces::{Batch, Field, batch, like_coefficients, slot_rows};
-use crate::lanes::{Lanes, Lanes4, Portable, Width};
+use crate::chunk::{Block, Chunk, filled, late_sum};
+use crate::contact::{COEFFICIENTS, Interaction};
+use crate::forces::{
+    Field, Into, Pairs, WIDEST, find, like_coefficients, press, put_back, slot_rows, sum_eights,
+};
+use crate::lanes::{Eight, Lanes, Lanes4, Portable, Width, flat};
 use crate::loads::Loads;
 use crate::motion::{Body, Motion, Sum};
 use crate::neighbours::Row;
-use crate::rows::Rows;
+use crate::rows::{Rows, fetch};
+use crate::team::Team;
 use crate::walls::WallContacts;
+use std::time::Instant;
 
 /// What a sweep does.
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,6 +41,7 @@ pub(crate) struct Sweep<'a> {
     pub width: Width,
     /// Whether chunks are shared out over threads.
     pub parallel: bool,
+    pub team: &'a Team,
     pub field: Field<'a>,
     pub walls: &'a WallContacts,
     pub loads: &'a Loads,
@@ -49,109 +53,37 @@ pub(crate) struct Sweep<'a> {
     pub fixed: &'a [u32],
 }
 
-/// What a sweep leaves for consecutive rows of grains.
-pub(crate) struct Moved<'a> {
-    /// Number of the first row and fixed grain.
-    pub first: [usize; 2],
-    /// Square of the largest speed against the row's drift (m²/s²).
-    pub fastest: &'a mut [f64],
-    /// Momentum that each fixed grain has taken from free ones (N s).
-    pub taken: &'a mut [[f64; 4]],
-}
-
-impl Moved<'_> {
-    /// Cuts in front of a chunk.
-    fn cut(self, chunk: &Chunk, fixed: &[u32]) -> (Self, Self) {
-        let (grain, row) = (chunk.grains.start, chunk.rows.start);
-        let held = fixed.partition_point(|&f| (f as usize) < grain);
-        let [r, f] = self.first;
-        let (fastest, fastest_b) = self.fastest.split_at_mut(row - r);
-        let (taken, taken_b) = self.taken.split_at_mut(held - f);
-        let front = Moved {
-            first: self.first,
-            fastest,
-            taken,
-        };
-        let back = Moved {
-            first: [row, held],
-            fastest: fastest_b,
-            taken: taken_b,
-        };
-        (front, back)
-    }
-
-    fn reborrow(&mut self) -> Moved<'_> {
-        Moved {
-            first: self.first,
-            fastest: self.fastest,
-            taken: self.taken,
-        }
-    }
-}
-
 /// Runs a pass over all chunks; the largest overlap over the harmonic mean radius.
-pub(crate) fn run<I: Interaction>(
-    law: &I,
-    sweep: &Sweep,
-    chunks: &mut [Chunk],
-    mut moved: Moved,
-) -> f64 {
+pub(crate) fn run<I: Interaction>(law: &I, sweep: &Sweep, chunks: &mut [Chunk]) -> f64 {
     let rows = slot_rows::<I>();
     for chunk in chunks.iter_mut() {
-        chunk.make_room(sweep.pass, rows);
+        chunk.make_room(sweep.pass, rows, I::HISTORY);
     }
-    let deepest = first(law, sweep, chunks, moved.reborrow());
-    if sweep.pass == Pass::Step && chunks.len() > 1 {
-        second::<I>(sweep, chunks, chunks, moved);
+    if chunks.len() > 1 && sweep.pass != Pass::Motion {
+        sweep
+            .team
+            .each(sweep.parallel, chunks, &|chunk: &mut Chunk| {
+                sweep.field.rows.copy(&chunk.ghosts, chunk.first_ghost);
+            });
     }
-    deepest
-}
-
-/// Sweeps each chunk.
-fn first<I: Interaction>(law: &I, sweep: &Sweep, chunks: &mut [Chunk], moved: Moved) -> f64 {
-    if let [chunk] = chunks {
-        return match sweep.width {
-            Width::Portable => chunk_rows::<Portable, I>(law, sweep, chunk, moved),
-            // SAFETY: the width is one that the processor has.
-            #[cfg(target_arch = "x86_64")]
-            Width::Avx2 => unsafe { chunk_avx2(law, sweep, chunk, moved) },
-            // SAFETY: the width is one that the processor has.
-            #[cfg(target_arch = "x86_64")]
-            Width::Avx512 => unsafe { chunk_avx512(law, sweep, chunk, moved) },
-        };
-    }
-    let (front, back) = chunks.split_at_mut(chunks.len() / 2);
-    let (moved_front, moved_back) = moved.cut(&back[0], sweep.fixed);
-    let front = || first(law, sweep, front, moved_front);
-    let back = || first(law, sweep, back, moved_back);
-    let (a, b) = if sweep.parallel {
-        rayon::join(front, back)
-    } else {
-        (front(), back())
-    };
-    a.max(b)
-}
-
-/// Moves the shared grains of each chunk.
-fn second<I: Interaction>(sweep: &Sweep, all: &[Chunk], chunks: &[Chunk], moved: Moved) {
-    if let [chunk] = chunks {
-        return match sweep.width {
-            Width::Portable => shared_in::<Portable, I>(sweep, all, chunk, moved),
-            // SAFETY: the width is one that the processor has; the widest ones include AVX2.
-            #[cfg(target_arch = "x86_64")]
-            Width::Avx2 | Width::Avx512 => unsafe { shared_avx2::<I>(sweep, all, chunk, moved) },
-        };
-    }
-    let (front, back) = chunks.split_at(chunks.len() / 2);
-    let (moved_front, moved_back) = moved.cut(&back[0], sweep.fixed);
-    let front = || second::<I>(sweep, all, front, moved_front);
-    let back = || second::<I>(sweep, all, back, moved_back);
-    if sweep.parallel {
-        rayon::join(front, back);
-    } else {
-        front();
-        back();
-    }
+    sweep
+        .team
+        .each(sweep.parallel, chunks, &|chunk: &mut Chunk| {
+            let begin = Instant::now();
+            chunk.deepest = match sweep.width {
+                Width::Portable => chunk_rows::<Portable, I>(law, sweep, chunk),
+                // SAFETY: the width is one that the processor has.
+                #[cfg(target_arch = "x86_64")]
+                Width::Avx2 => unsafe { chunk_avx2(law, sweep, chunk) },
+                // SAFETY: the width is one that the processor has.
+                #[cfg(target_arch = "x86_64")]
+                Width::Avx512 => unsafe { chunk_avx512(law, sweep, chunk) },
+            };
+            if sweep.pass == Pass::Step {
+                chunk.time = chunk.time.min(begin.elapsed().as_secs_f64());
+            }
+        });
+    chunks.iter().map(|c| c.deepest).fold(0.0, f64::max)
 }
 
 /// The sweep compiled for AVX2.
@@ -159,14 +91,9 @@ fn second<I: Interaction>(sweep: &Sweep, all: &[Chunk], chunks: &[Chunk], moved:
 /// # Safety
 /// The processor must have AVX2.
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-unsafe fn chunk_avx2<I: Interaction>(
-    law: &I,
-    sweep: &Sweep,
-    chunk: &mut Chunk,
-    moved: Moved,
-) -> f64 {
-    chunk_rows::<crate::lanes::avx2::Avx2, I>(law, sweep, chunk, moved)
+#[target_feature(enable = "avx2,popcnt")]
+unsafe fn chunk_avx2<I: Interaction>(law: &I, sweep: &Sweep, chunk: &mut Chunk) -> f64 {
+    chunk_rows::<crate::lanes::avx2::Avx2, I>(law, sweep, chunk)
 }
 
 /// The sweep compiled for AVX-512.
@@ -174,37 +101,17 @@ unsafe fn chunk_avx2<I: Interaction>(
 /// # Safety
 /// The processor must have AVX-512 (F, DQ, VL).
 #[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2,avx512f,avx512dq,avx512vl")]
-unsafe fn chunk_avx512<I: Interaction>(
-    law: &I,
-    sweep: &Sweep,
-    chunk: &mut Chunk,
-    moved: Moved,
-) -> f64 {
-    chunk_rows::<crate::lanes::avx512::Avx512, I>(law, sweep, chunk, moved)
-}
-
-/// Moving the shared grains, compiled for AVX2.
-///
-/// # Safety
-/// The processor must have AVX2.
-#[cfg(target_arch = "x86_64")]
-#[target_feature(enable = "avx2")]
-unsafe fn shared_avx2<I: Interaction>(sweep: &Sweep, all: &[Chunk], chunk: &Chunk, moved: Moved) {
-    shared_in::<crate::lanes::avx2::Avx2, I>(sweep, all, chunk, moved);
+#[target_feature(enable = "avx2,popcnt,avx512f,avx512dq,avx512vl")]
+unsafe fn chunk_avx512<I: Interaction>(law: &I, sweep: &Sweep, chunk: &mut Chunk) -> f64 {
+    chunk_rows::<crate::lanes::avx512::Avx512, I>(law, sweep, chunk)
 }
 
 #[inline(always)]
-fn chunk_rows<L: Lanes, I: Interaction>(
-    law: &I,
-    sweep: &Sweep,
-    chunk: &mut Chunk,
-    moved: Moved,
-) -> f64 {
+fn chunk_rows<L: Lanes, I: Interaction>(law: &I, sweep: &Sweep, chunk: &mut Chunk) -> f64 {
     if I::ROLLING {
-        chunk_in::<L, I, 3>(law, sweep, chunk, moved)
+        chunk_in::<L, I, 3>(law, sweep, chunk)
     } else {
-        chunk_in::<L, I, 2>(law, sweep, chunk, moved)
+        chunk_in::<L, I, 2>(law, sweep, chunk)
     }
 }
 
@@ -213,223 +120,238 @@ fn chunk_in<L: Lanes, I: Interaction, const ROWS: usize>(
     law: &I,
     sweep: &Sweep,
     chunk: &mut Chunk,
-    mut moved: Moved,
 ) -> f64 {
     let mut deepest = L::splat(0.0);
     let like = like_coefficients::<L, I>(law);
     let mut cursor = Cursor::default();
-    moved.fastest.fill(0.0);
-    if sweep.pass == Pass::Motion {
-        for g in chunk.grains.clone() {
-            let sum = Sum::<L::Row>::load(&sweep.totals[g]);
-            move_grain(sweep, g, &sum, &mut moved, &mut cursor);
-        }
-        return 0.0;
-    }
-    let mut from = End::default();
-    let (mut exported, mut shared) = (0, 0);
-    for block in 0..chunk.ends.len() {
-        let end = chunk.ends[block];
-        let first = if sweep.pass == Pass::Step {
-            from.places as usize
-        } else {
-            0
-        };
-        if let Some(next) = chunk.ends.get(block + 1) {
-            let ahead = end.reached as usize..next.reached as usize;
-            sweep.field.rows.fetch(ahead);
-        }
-        for place in (from.places as usize..end.places as usize).step_by(L::WIDTH) {
-            let fours = L::WIDTH / 4;
-            let pairs = Batch {
-                i: &chunk.i[place..place + L::WIDTH],
-                j: &chunk.j[place..place + L::WIDTH],
-                lanes: &mut chunk.lanes[place / 4..][..fours],
-                history: &mut chunk.history[place / 4 * I::HISTORY..][..fours * I::HISTORY],
-                slots: &mut chunk.slots[(place - first) * ROWS..][..L::WIDTH * ROWS],
-            };
-            batch::<L, I>(law, &like, &sweep.field, pairs, &mut deepest);
-        }
-        if sweep.pass == Pass::Step {
-            exported = chunk.export_slots(exported, first, end, ROWS);
-            chunk.sum_block::<L::Row, ROWS>(first, from, end);
-            let grains = chunk.grains.start + block * BLOCK..chunk.grains.end;
-            for g in grains.take(BLOCK) {
-                let mut sum = chunk.take_sum::<L::Row, ROWS>(g);
-                if shared < chunk.shared.len() && chunk.shared[shared].grain as usize == g {
-                    shared += 1;
-                    continue;
-                }
-                sum.lean(sweep.walls, g);
-                sum.bear(sweep.loads, g);
-                move_grain(sweep, g, &sum, &mut moved, &mut cursor);
+    for b in 0..chunk.blocks.len() {
+        let block = chunk.blocks[b].clone();
+        if let Some(next) = chunk.blocks.get(b + 1) {
+            let places = next.places.start / WIDEST..next.places.end.div_ceil(WIDEST);
+            fetch(&chunk.i[WIDEST * places.start..WIDEST * places.end]);
+            fetch(&chunk.j[WIDEST * places.start..WIDEST * places.end]);
+            fetch(&chunk.history[I::HISTORY * places.start..I::HISTORY * places.end]);
+            if next.span == block.span && block.span.is_some() {
+                let reached = block.reached..next.reached.max(block.reached);
+                sweep.field.rows.fetch(reached);
             }
         }
-        from = end;
+        if sweep.pass != Pass::Motion {
+            let block_depth = block_forces::<L, I, ROWS>(law, &like, sweep, chunk, &block);
+            deepest = deepest.max(block_depth);
+        }
+        let Some(span) = block.span else {
+            continue;
+        };
+        if sweep.pass == Pass::Forces {
+            continue;
+        }
+        let own = &chunk.spans[span];
+        if block.grains.start == own.grains.start {
+            cursor.enter(sweep, own.rows.clone(), block.grains.start);
+        }
+        if sweep.pass == Pass::Motion {
+            for g in block.grains.clone() {
+                let sum = Sum::<L::Row>::load(&sweep.totals[g]);
+                move_grain(sweep, g, &sum, &mut cursor);
+            }
+            if block.grains.end == own.grains.end {
+                cursor.end_row(sweep);
+            }
+            continue;
+        }
+        let (first, mask) = if span == 0 {
+            (block.grains.start - own.grains.start, chunk.ring - 1)
+        } else {
+            (own.sums + block.grains.start - own.grains.start, usize::MAX)
+        };
+        let eights = sum_eights(ROWS);
+        let alone = sweep.walls.is_empty() && sweep.loads.is_empty();
+        for (k, g) in block.grains.clone().enumerate() {
+            let sum = &mut chunk.sums[((first + k) & mask) * eights..][..eights];
+            let rows = flat(sum).as_chunks::<4>().0;
+            let mut total = Sum::<L::Row>::load(&rows[..ROWS]);
+            sum.fill(Eight::default());
+            if !alone {
+                total.lean(sweep.walls, g);
+                total.bear(sweep.loads, g);
+            }
+            move_grain(sweep, g, &total, &mut cursor);
+        }
+        if block.grains.end == own.grains.end {
+            cursor.end_row(sweep);
+        }
     }
     chunk.clear_beyond(ROWS);
     deepest.largest()
 }
 
+/// Forces of the pairs of a block, into sums or slots; the largest overlaps.
+#[inline(always)]
+fn block_forces<L: Lanes, I: Interaction, const ROWS: usize>(
+    law: &I,
+    like: &[L; COEFFICIENTS],
+    sweep: &Sweep,
+    chunk: &mut Chunk,
+    block: &Block,
+) -> L {
+    let mut deepest = L::splat(0.0);
+    let first = block.places.start;
+    let places = first..first + filled(block.places.len());
+    let eights = first / WIDEST..places.end / WIDEST;
+    let histories = eights.start * I::HISTORY..eights.end * I::HISTORY;
+    let mut pairs = Pairs {
+        i: &chunk.i[places.clone()],
+        j: &chunk.j[places.clone()],
+        wraps: block.wraps,
+        touching: &mut chunk.touching[eights],
+        history: &mut chunk.history[histories],
+    };
+    let contacts = &mut chunk.contacts;
+    let observed = sweep.pass == Pass::Forces;
+    // SAFETY: lists hold numbers of rows alone: `Chunk::list` has looked at all of them.
+    unsafe { find::<L, I>(law, like, &sweep.field, &mut pairs, observed, contacts) };
+    let into = if observed {
+        Into::Slots(&mut chunk.slots[first * ROWS..][..places.len() * ROWS])
+    } else {
+        let eights = sum_eights(ROWS);
+        let grains = &chunk.spans[0].grains;
+        let (start, own) = (grains.start as u32, grains.len() as u32);
+        let (mask, beyond) = (
+            chunk.ring as u32 - 1,
+            (chunk.sums.len() / eights) as u32 - 1,
+        );
+        let numbers = (eights * WIDEST) as u32;
+        let count = contacts.count;
+        for (sums, grains) in contacts.sums.iter_mut().zip([&contacts.i, &contacts.j]) {
+            for (sum, grain) in sums[..count].iter_mut().zip(&grains[..count]) {
+                let at = grain.wrapping_sub(start);
+                *sum = if at < own { at & mask } else { beyond } * numbers;
+            }
+        }
+        if chunk.spans.len() > 1 {
+            for (sums, grains) in contacts.sums.iter_mut().zip([&contacts.i, &contacts.j]) {
+                for (sum, &grain) in sums[..count].iter_mut().zip(&grains[..count]) {
+                    if *sum == beyond * numbers {
+                        *sum = late_sum(&chunk.spans, grain, beyond) * numbers;
+                    }
+                }
+            }
+        }
+        Into::Sums(&mut chunk.sums)
+    };
+    // SAFETY: there are as many sums as a ring and those behind it, and the ring goes round.
+    unsafe { press::<L, I, ROWS>(law, like, &sweep.field, contacts, into, &mut deepest) };
+    put_back::<L, I>(&mut pairs, contacts);
+    deepest
+}
+
 impl Chunk {
     /// Makes room for what a pass leaves; slots of all pairs begin as zeros.
-    fn make_room(&mut self, pass: Pass, rows: usize) {
-        match pass {
-            Pass::Step => {
-                let slots = self.widest * rows;
-                if self.slots.len() < slots {
-                    self.slots.resize(slots, [0.0; 4]);
-                }
-                let sums = (self.ring + 1) * rows;
-                if self.sums.len() < sums {
-                    self.sums.resize(sums, [0.0; 4]);
-                }
-                if self.found.len() < self.widest {
-                    self.found.resize(self.widest, 0);
-                }
-                self.exports.resize(self.exported.len() * rows, [0.0; 4]);
-            }
-            Pass::Forces => {
-                self.slots.clear();
-                self.slots.resize(self.i.len() * rows, [0.0; 4]);
-            }
-            Pass::Motion => {}
+    fn make_room(&mut self, pass: Pass, rows: usize, history: usize) {
+        if pass == Pass::Motion {
+            return;
+        }
+        self.contacts.make_room(self.widest, history);
+        if pass == Pass::Step {
+            let eights = self.sum_count() * sum_eights(rows);
+            self.sums.resize(eights, Eight::default());
+        } else {
+            self.slots.clear();
+            self.slots.resize(self.i.len() * rows, [0.0; 4]);
         }
     }
 
-    /// Copies the slots of a block that are to outlive it; how many exports are there by now.
-    #[inline(always)]
-    fn export_slots(&mut self, mut exported: usize, first: usize, end: End, rows: usize) -> usize {
-        while exported < self.exported.len() && self.exported[exported] < end.places {
-            let place = self.exported[exported] as usize;
-            let touches = self.touches(place) == 1;
-            let copy = &mut self.exports[exported * rows..][..rows];
-            if touches {
-                copy.copy_from_slice(&self.slots[(place - first) * rows..][..rows]);
-            } else {
-                copy.fill([0.0; 4]);
-            }
-            exported += 1;
-        }
-        exported
-    }
-
-    /// 1 if the pair at a place touched when it was evaluated, else 0.
-    #[inline(always)]
-    pub(crate) fn touches(&self, place: usize) -> usize {
-        usize::from(self.lanes[place / 4] >> (place % 4) & 1)
-    }
-
-    /// Adds the touching pairs of a block to the sums of both grains, in their order.
-    #[inline(always)]
-    fn sum_block<L: Lanes4, const ROWS: usize>(&mut self, first: usize, from: End, end: End) {
-        // Which pairs touch cannot be foreseen: they are picked out without a branch.
-        let mut touching = 0;
-        for &place in &self.order[from.pairs as usize..end.pairs as usize] {
-            self.found[touching] = place;
-            touching += self.touches(place as usize);
-        }
-        let (start, n, ring) = (self.grains.start, self.grains.len(), self.ring);
-        let slots = self.slots.as_chunks::<ROWS>().0;
-        let sums = self.sums.as_chunks_mut::<ROWS>().0;
-        for &place in &self.found[..touching] {
-            let place = place as usize;
-            let slot = Sum::<L>::load(&slots[place - first]);
-            let i = (self.i[place] as usize - start) & (ring - 1);
-            let j = self.j[place] as usize - start;
-            // Partners in later chunks take theirs from the exports.
-            let j = if j < n { j & (ring - 1) } else { ring };
-            let mut sum = Sum::<L>::load(&sums[i]);
-            sum.add(&slot);
-            sum.store(&mut sums[i]);
-            let mut sum = Sum::<L>::load(&sums[j]);
-            sum.subtract(&slot);
-            sum.store(&mut sums[j]);
-        }
-    }
-
-    /// Takes the sum of a grain out of the ring.
-    #[inline(always)]
-    fn take_sum<L: Lanes4, const ROWS: usize>(&mut self, g: usize) -> Sum<L> {
-        let at = (g - self.grains.start) & (self.ring - 1);
-        let rows = &mut self.sums.as_chunks_mut::<ROWS>().0[at];
-        let sum = Sum::load(rows);
-        *rows = [[0.0; 4]; ROWS];
-        sum
-    }
-
-    /// Clears the sum of partners in later chunks: the ring is empty between steps.
+    /// Clears the sum of others' grains: all are zero between steps.
     fn clear_beyond(&mut self, rows: usize) {
-        if let Some(beyond) = self.sums.get_mut(self.ring * rows..(self.ring + 1) * rows) {
-            beyond.fill([0.0; 4]);
-        }
+        let beyond = self.sums.len().saturating_sub(sum_eights(rows));
+        self.sums[beyond..].fill(Eight::default());
     }
 }
 
-#[inline(always)]
-fn shared_in<L: Lanes4, I: Interaction>(
-    sweep: &Sweep,
-    all: &[Chunk],
-    chunk: &Chunk,
-    mut moved: Moved,
-) {
-    let mut cursor = Cursor::default();
-    for s in 0..chunk.shared.len() {
-        let g = chunk.shared[s].grain as usize;
-        let mut sum = Sum::<L>::import(all, chunk, s, slot_rows::<I>());
-        sum.lean(sweep.walls, g);
-        sum.bear(sweep.loads, g);
-        move_grain(sweep, g, &sum, &mut moved, &mut cursor);
-    }
-}
-
-/// Row and fixed grain at which a run over rising grains has arrived, counted from the first.
+/// Row and fixed grain at which a run over rising grains has arrived.
 #[derive(Default)]
 struct Cursor {
     row: usize,
+    /// Where the row's grains end, and its drift.
+    end: usize,
+    drift: [f64; 4],
+    /// Square of its largest speed against it (m²/s²), and zero unless some speed is not a number.
+    fastest: f64,
+    check: f64,
     fixed: usize,
 }
 
+impl Cursor {
+    /// Begins at the first grain of a span.
+    fn enter(&mut self, sweep: &Sweep, rows: std::ops::Range<usize>, grain: usize) {
+        for fastest in &sweep.field.rows.fastest[rows.clone()] {
+            fastest.set(0.0);
+        }
+        self.fixed = sweep.fixed.partition_point(|&f| (f as usize) < grain);
+        self.row = rows.start;
+        self.begin_row(sweep);
+    }
+
+    fn begin_row(&mut self, sweep: &Sweep) {
+        let Row { end, drift, .. } = sweep.rows[self.row];
+        self.end = end as usize;
+        self.drift = [drift[0], drift[1], drift[2], 0.0];
+        (self.fastest, self.check) = (0.0, 0.0);
+    }
+
+    /// Notes the fastest grain of a row.
+    fn end_row(&self, sweep: &Sweep) {
+        if let Some(fastest) = sweep.field.rows.fastest.get(self.row) {
+            fastest.set(self.fastest + self.check);
+        }
+    }
+
+    fn next_row(&mut self, sweep: &Sweep) {
+        self.end_row(sweep);
+        self.row += 1;
+        self.begin_row(sweep);
+    }
+}
+
 #[inline(always)]
-fn move_grain<L: Lanes4>(
-    sweep: &Sweep,
-    g: usize,
-    sum: &Sum<L>,
-    moved: &mut Moved,
-    cursor: &mut Cursor,
-) {
+fn move_grain<L: Lanes4>(sweep: &Sweep, g: usize, sum: &Sum<L>, cursor: &mut Cursor) {
     let Rows {
         place,
         motion,
         turn,
+        taken,
+        ..
     } = sweep.field.rows;
-    let [first_row, first_fixed] = moved.first;
     let body = Body([
         L::load(&place[g].get()),
         L::load(&motion[g].get()),
         L::load(&turn[g].get()),
     ]);
     let body = body.moved(sum, &sweep.motion);
-    let v = body.row(1);
     place[g].set(body.row(0));
-    motion[g].set(v);
+    motion[g].set(body.row(1));
     turn[g].set(body.row(2));
-    while sweep.rows[first_row + cursor.row].end as usize <= g {
-        cursor.row += 1;
+    while cursor.end <= g {
+        cursor.next_row(sweep);
     }
-    let drift = &sweep.rows[first_row + cursor.row].drift;
-    let (a, b, c) = (v[0] - drift[0], v[1] - drift[1], v[2] - drift[2]);
-    let speed2 = a * a + b * b + c * c;
+    let against = body.0[1] - L::load(&cursor.drift);
+    let speed2 = (against * against).sum_of_three();
     // Not a number must stay: the bound then says that lists are outdated, and the state is checked.
-    let fastest = &mut moved.fastest[cursor.row];
-    let faster = if speed2 > *fastest { speed2 } else { *fastest };
-    *fastest = faster + 0.0 * speed2;
-    if v[3] == 0.0 {
-        while (sweep.fixed[first_fixed + cursor.fixed] as usize) < g {
+    cursor.fastest = if speed2 > cursor.fastest {
+        speed2
+    } else {
+        cursor.fastest
+    };
+    cursor.check += 0.0 * speed2;
+    if body.row(1)[3] == 0.0 {
+        while (sweep.fixed[cursor.fixed] as usize) < g {
             cursor.fixed += 1;
         }
-        let taken = &mut moved.taken[cursor.fixed];
-        (L::load(taken) + L::splat(sweep.motion.kick) * sum.0[0]).store(taken);
+        let taken = &taken[cursor.fixed];
+        let mut after = [0.0; 4];
+        (L::load(&taken.get()) + L::splat(sweep.motion.kick) * sum.0[0]).store(&mut after);
+        taken.set(after);
     }
 }
 

@@ -28,7 +28,8 @@ impl Simulation {
         };
         for (chunk, k) in self.reach.pairs() {
             let slot = &chunk.slots[k * rows];
-            sum += vector(slot) * apart(chunk.i[k] as usize, chunk.j[k] as usize).transpose();
+            let [i, j] = chunk.pair(k);
+            sum += vector(slot) * apart(i, j).transpose();
         }
         for bond in self.bonds.whole() {
             let [i, j] = bond.rows.map(|row| row as usize);

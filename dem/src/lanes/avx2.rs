@@ -4,13 +4,13 @@
 //! functions compiled for AVX2, which are entered only after the processor has been asked
 //! ([`super::Width`]); every method is inlined into them.
 
-use super::{Lane, Lanes, Lanes4, Row};
+use super::{Lane, Lanes, Lanes4};
 use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// See the module.
 #[derive(Clone, Copy)]
-pub struct Avx2(__m256d);
+pub struct Avx2(pub(super) __m256d);
 
 macro_rules! avx2_operator {
     ($trait:ident, $method:ident, $intrinsic:ident) => {
@@ -35,6 +35,71 @@ impl Neg for Avx2 {
     fn neg(self) -> Self {
         // SAFETY: the module's invariant: AVX2 is present.
         Avx2(unsafe { _mm256_xor_pd(self.0, _mm256_set1_pd(-0.0)) })
+    }
+}
+
+/// For every choice of lanes, which halves of numbers, two each, bring the chosen ones to the front.
+const PACK: [[u32; 8]; 16] = halves(true);
+
+/// The same for bringing them back.
+const UNPACK: [[u32; 8]; 16] = halves(false);
+
+/// All bits of the chosen lanes.
+const MASK: [[u64; 4]; 16] = {
+    let mut masks = [[0; 4]; 16];
+    let mut bits = 0;
+    while bits < 16 {
+        let mut lane = 0;
+        while lane < 4 {
+            if bits >> lane & 1 == 1 {
+                masks[bits][lane] = u64::MAX;
+            }
+            lane += 1;
+        }
+        bits += 1;
+    }
+    masks
+};
+
+const fn halves(pack: bool) -> [[u32; 8]; 16] {
+    let mut all = [[0; 8]; 16];
+    let mut bits = 0;
+    while bits < 16 {
+        let (mut lane, mut count) = (0, 0);
+        while lane < 4 {
+            if bits >> lane & 1 == 1 {
+                let (to, from) = if pack { (count, lane) } else { (lane, count) };
+                all[bits][2 * to] = 2 * from as u32;
+                all[bits][2 * to + 1] = 2 * from as u32 + 1;
+                count += 1;
+            }
+            lane += 1;
+        }
+        bits += 1;
+    }
+    all
+}
+
+impl Avx2 {
+    /// The row with this number, out of rows of four.
+    ///
+    /// # Safety
+    /// It must be there.
+    #[inline(always)]
+    pub(super) unsafe fn row(rows: *const f64, at: *const u32) -> Self {
+        // SAFETY: the caller's promise.
+        unsafe { Self::read(rows.add(4 * *at as usize)) }
+    }
+
+    /// Takes halves of numbers by their places.
+    #[inline(always)]
+    fn pick(self, halves: &[u32; 8]) -> Self {
+        // SAFETY: the module's invariant; `halves` is 32 readable bytes.
+        unsafe {
+            let halves = _mm256_loadu_si256(halves.as_ptr().cast());
+            let picked = _mm256_permutevar8x32_ps(_mm256_castpd_ps(self.0), halves);
+            Avx2(_mm256_castps_pd(picked))
+        }
     }
 }
 
@@ -108,19 +173,34 @@ impl Lanes4 for Avx2 {
         // SAFETY: the module's invariant: AVX2 is present.
         Avx2(unsafe { _mm256_permute4x64_pd::<0xff>(self.0) })
     }
+    #[inline(always)]
+    fn sum_of_three(self) -> f64 {
+        // SAFETY: the module's invariant: AVX2 is present.
+        unsafe {
+            let (front, back) = (
+                _mm256_castpd256_pd128(self.0),
+                _mm256_extractf128_pd::<1>(self.0),
+            );
+            let two = _mm_add_sd(front, _mm_unpackhi_pd(front, front));
+            _mm_cvtsd_f64(_mm_add_sd(two, back))
+        }
+    }
 }
 
 impl Lanes for Avx2 {
     const WIDTH: usize = 4;
     type Row = Self;
     #[inline(always)]
-    fn gather(of: &[impl Row], at: &[u32]) -> [Self; 4] {
-        [
-            Self::load(&of[at[0] as usize].read()),
-            Self::load(&of[at[1] as usize].read()),
-            Self::load(&of[at[2] as usize].read()),
-            Self::load(&of[at[3] as usize].read()),
-        ]
+    unsafe fn gather(rows: *const f64, at: *const u32) -> [Self; 4] {
+        // SAFETY: the caller's promise.
+        unsafe {
+            [
+                Self::row(rows, at),
+                Self::row(rows, at.add(1)),
+                Self::row(rows, at.add(2)),
+                Self::row(rows, at.add(3)),
+            ]
+        }
     }
     #[inline(always)]
     fn repeat(row: &[f64; 4]) -> Self {
@@ -147,18 +227,38 @@ impl Lanes for Avx2 {
         Lanes4::splat_last(self)
     }
     #[inline(always)]
-    fn scatter(rows: [Self; 4], to: &mut [[f64; 4]], at: usize, stride: usize) {
-        for (r, row) in rows.into_iter().enumerate() {
-            row.store(&mut to[at + r * stride]);
+    fn pair(rows: &[Self; 4], p: usize) -> Self {
+        rows[p & 3]
+    }
+    #[inline(always)]
+    unsafe fn read(numbers: *const f64) -> Self {
+        // SAFETY: the module's invariant; the caller's promise.
+        Avx2(unsafe { _mm256_loadu_pd(numbers) })
+    }
+    #[inline(always)]
+    unsafe fn write(self, numbers: *mut f64) {
+        // SAFETY: the module's invariant; the caller's promise.
+        unsafe { _mm256_storeu_pd(numbers, self.0) }
+    }
+    #[inline(always)]
+    unsafe fn pack(self, bits: u8, numbers: *mut f64) {
+        // SAFETY: the caller's promise.
+        unsafe { self.pick(&PACK[usize::from(bits & 15)]).write(numbers) }
+    }
+    #[inline(always)]
+    unsafe fn unpack(numbers: *const f64, bits: u8) -> Self {
+        let bits = usize::from(bits & 15);
+        // SAFETY: the module's invariant; the caller's promise; masks are 32 readable bytes.
+        unsafe {
+            let mask = _mm256_loadu_si256(MASK[bits].as_ptr().cast());
+            let numbers = Self::read(numbers).pick(&UNPACK[bits]);
+            Avx2(_mm256_and_pd(_mm256_castsi256_pd(mask), numbers.0))
         }
     }
     #[inline(always)]
-    fn read(blocks: &[[f64; 4]], k: usize, _: usize) -> Self {
-        Self::load(&blocks[k])
-    }
-    #[inline(always)]
-    fn write(self, blocks: &mut [[f64; 4]], k: usize, _: usize) {
-        self.store(&mut blocks[k]);
+    unsafe fn pack_indices(indices: *const u32, bits: u8, packed: *mut u32) {
+        // SAFETY: the caller's promise.
+        unsafe { super::pack_four(indices, bits, packed) }
     }
     #[inline(always)]
     fn lanes(mask: __m256d) -> u8 {

@@ -5,7 +5,7 @@
 //! processor has been asked ([`super::Width`]); every method is inlined into them.
 
 use super::avx2::Avx2;
-use super::{Lane, Lanes, Row};
+use super::{Lane, Lanes, Lanes4};
 use std::arch::x86_64::*;
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
@@ -58,8 +58,8 @@ impl Lane for Avx512 {
         for number in &mut numbers {
             *number = number.cbrt();
         }
-        // SAFETY: the module's invariant; `numbers` is 64 readable bytes.
-        Avx512(unsafe { _mm512_loadu_pd(numbers.as_ptr()) })
+        // SAFETY: eight numbers.
+        unsafe { Self::read(numbers.as_ptr()) }
     }
     #[inline(always)]
     fn abs(self) -> Self {
@@ -100,31 +100,33 @@ impl Avx512 {
     #[inline(always)]
     fn numbers(self) -> [f64; 8] {
         let mut numbers = [0.0; 8];
-        // SAFETY: the module's invariant; `numbers` is 64 writable bytes.
-        unsafe { _mm512_storeu_pd(numbers.as_mut_ptr(), self.0) };
+        // SAFETY: eight numbers.
+        unsafe { self.write(numbers.as_mut_ptr()) };
         numbers
     }
 
     /// Two rows side by side.
     #[inline(always)]
-    fn join(low: &[f64; 4], high: &[f64; 4]) -> Self {
-        // SAFETY: the module's invariant; the rows are 32 readable bytes each.
+    fn join(low: Avx2, high: Avx2) -> Self {
+        // SAFETY: the module's invariant: AVX-512 is present.
         unsafe {
-            let low = _mm512_castpd256_pd512(_mm256_loadu_pd(low.as_ptr()));
-            Avx512(_mm512_insertf64x4::<1>(low, _mm256_loadu_pd(high.as_ptr())))
+            let low = _mm512_castpd256_pd512(low.0);
+            Avx512(_mm512_insertf64x4::<1>(low, high.0))
         }
     }
 
+    /// The first of two rows side by side.
     #[inline(always)]
-    fn store_low(self, row: &mut [f64; 4]) {
-        // SAFETY: the module's invariant; `row` is 32 writable bytes.
-        unsafe { _mm256_storeu_pd(row.as_mut_ptr(), _mm512_castpd512_pd256(self.0)) }
+    fn low(self) -> Avx2 {
+        // SAFETY: the module's invariant: AVX-512 is present.
+        Avx2(unsafe { _mm512_castpd512_pd256(self.0) })
     }
 
+    /// The second.
     #[inline(always)]
-    fn store_high(self, row: &mut [f64; 4]) {
-        // SAFETY: the module's invariant; `row` is 32 writable bytes.
-        unsafe { _mm256_storeu_pd(row.as_mut_ptr(), _mm512_extractf64x4_pd::<1>(self.0)) }
+    fn high(self) -> Avx2 {
+        // SAFETY: the module's invariant: AVX-512 is present.
+        Avx2(unsafe { _mm512_extractf64x4_pd::<1>(self.0) })
     }
 }
 
@@ -132,16 +134,20 @@ impl Lanes for Avx512 {
     const WIDTH: usize = 8;
     type Row = Avx2;
     #[inline(always)]
-    fn gather(of: &[impl Row], at: &[u32]) -> [Self; 4] {
-        [
-            Self::join(&of[at[0] as usize].read(), &of[at[4] as usize].read()),
-            Self::join(&of[at[1] as usize].read(), &of[at[5] as usize].read()),
-            Self::join(&of[at[2] as usize].read(), &of[at[6] as usize].read()),
-            Self::join(&of[at[3] as usize].read(), &of[at[7] as usize].read()),
-        ]
+    unsafe fn gather(rows: *const f64, at: *const u32) -> [Self; 4] {
+        // SAFETY: the caller's promise.
+        unsafe {
+            [
+                Self::join(Avx2::row(rows, at), Avx2::row(rows, at.add(4))),
+                Self::join(Avx2::row(rows, at.add(1)), Avx2::row(rows, at.add(5))),
+                Self::join(Avx2::row(rows, at.add(2)), Avx2::row(rows, at.add(6))),
+                Self::join(Avx2::row(rows, at.add(3)), Avx2::row(rows, at.add(7))),
+            ]
+        }
     }
     #[inline(always)]
     fn repeat(row: &[f64; 4]) -> Self {
+        let row = Avx2::load(row);
         Self::join(row, row)
     }
     #[inline(always)]
@@ -169,20 +175,73 @@ impl Lanes for Avx512 {
         Avx512(unsafe { _mm512_permutex_pd::<0xff>(self.0) })
     }
     #[inline(always)]
-    fn scatter(rows: [Self; 4], to: &mut [[f64; 4]], at: usize, stride: usize) {
-        for (r, row) in rows.into_iter().enumerate() {
-            row.store_low(&mut to[at + r * stride]);
-            row.store_high(&mut to[at + (r + 4) * stride]);
+    fn pair(rows: &[Self; 4], p: usize) -> Avx2 {
+        if p < 4 {
+            rows[p].low()
+        } else {
+            rows[p & 3].high()
         }
     }
     #[inline(always)]
-    fn read(blocks: &[[f64; 4]], k: usize, width: usize) -> Self {
-        Self::join(&blocks[k], &blocks[k + width])
+    unsafe fn read(numbers: *const f64) -> Self {
+        // SAFETY: the module's invariant; the caller's promise.
+        Avx512(unsafe { _mm512_loadu_pd(numbers) })
     }
     #[inline(always)]
-    fn write(self, blocks: &mut [[f64; 4]], k: usize, width: usize) {
-        self.store_low(&mut blocks[k]);
-        self.store_high(&mut blocks[k + width]);
+    unsafe fn write(self, numbers: *mut f64) {
+        // SAFETY: the module's invariant; the caller's promise.
+        unsafe { _mm512_storeu_pd(numbers, self.0) }
+    }
+    #[inline(always)]
+    unsafe fn pack(self, bits: u8, numbers: *mut f64) {
+        // In the register: packing while writing takes a hundred cycles on some processors.
+        // SAFETY: the module's invariant; the caller's promise.
+        unsafe { Avx512(_mm512_maskz_compress_pd(bits, self.0)).write(numbers) }
+    }
+    #[inline(always)]
+    unsafe fn unpack(numbers: *const f64, bits: u8) -> Self {
+        // SAFETY: the module's invariant; the caller's promise.
+        Avx512(unsafe { _mm512_maskz_expand_pd(bits, Self::read(numbers).0) })
+    }
+    #[inline(always)]
+    unsafe fn pack_indices(indices: *const u32, bits: u8, packed: *mut u32) {
+        // SAFETY: the module's invariant; the caller's promise.
+        unsafe {
+            let indices = _mm256_loadu_si256(indices.cast());
+            let indices = _mm256_maskz_compress_epi32(bits, indices);
+            _mm256_storeu_si256(packed.cast(), indices);
+        }
+    }
+    #[inline(always)]
+    unsafe fn add_pair<const ROWS: usize>(
+        rows: &[[Self; 4]; ROWS],
+        p: usize,
+        own: *mut f64,
+        other: *mut f64,
+    ) {
+        // The first two rows of a pair side by side.
+        let (a, b) = (rows[0][p & 3].0, rows[1][p & 3].0);
+        // SAFETY: the module's invariant; the caller's promise.
+        unsafe {
+            let both = Avx512(if p < 4 {
+                _mm512_insertf64x4::<1>(a, _mm512_castpd512_pd256(b))
+            } else {
+                _mm512_shuffle_f64x2::<0b1110_1110>(a, b)
+            });
+            (Self::read(own) + both).write(own);
+            let turned = _mm512_setr_pd(-0.0, -0.0, -0.0, -0.0, 0.0, 0.0, 0.0, 0.0);
+            let turned = Avx512(_mm512_xor_pd(both.0, turned));
+            if ROWS == 2 {
+                (Self::read(other) + turned).write(other);
+                return;
+            }
+            let row = Self::pair(&rows[2], p);
+            let own = own.add(8);
+            (Avx2::read(own) + row).write(own);
+            (Self::read(other) + turned).write(other);
+            let other = other.add(8);
+            (Avx2::read(other) - row).write(other);
+        }
     }
     #[inline(always)]
     fn lanes(mask: __mmask8) -> u8 {

@@ -45,19 +45,6 @@ pub trait Lane:
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
 }
 
-/// Four numbers in memory.
-pub trait Row {
-    /// The numbers.
-    fn read(&self) -> [f64; 4];
-}
-
-impl Row for [f64; 4] {
-    #[inline(always)]
-    fn read(&self) -> [f64; 4] {
-        *self
-    }
-}
-
 /// A row of four numbers.
 pub trait Lanes4: Lane {
     /// Reads a row.
@@ -66,6 +53,8 @@ pub trait Lanes4: Lane {
     fn store(self, row: &mut [f64; 4]);
     /// The last number of the row in every lane.
     fn splat_last(self) -> Self;
+    /// The first three numbers added, from the first.
+    fn sum_of_three(self) -> f64;
 }
 
 /// As many pairs as there are lanes, four or eight; or a row of four numbers of each of a quarter of
@@ -74,25 +63,116 @@ pub trait Lanes: Lane {
     /// Number of pairs.
     const WIDTH: usize;
     /// Rows one at a time, on the same processor.
-    type Row: Lanes4;
-    /// Rows `at` of an array.
-    fn gather(of: &[impl Row], at: &[u32]) -> [Self; 4];
+    type Row: Lanes4 + Lanes;
+    /// The rows with these numbers, out of rows of four.
+    ///
+    /// # Safety
+    /// There must be as many numbers as lanes, and rows with all of them.
+    unsafe fn gather(rows: *const f64, at: *const u32) -> [Self; 4];
     /// The same four numbers for every pair.
     fn repeat(row: &[f64; 4]) -> Self;
     /// Rows of pairs to columns, and back.
     fn transpose(rows: [Self; 4]) -> [Self; 4];
     /// The last of each pair's four numbers in all four places.
     fn splat_last(self) -> Self;
-    /// Writes rows `at`, `at + stride`, … of an array, a pair after the other.
-    fn scatter(rows: [Self; 4], to: &mut [[f64; 4]], at: usize, stride: usize);
-    /// Reads number `k` of histories in blocks of four pairs and `width` rows.
-    fn read(blocks: &[[f64; 4]], k: usize, width: usize) -> Self;
-    /// Writes it.
-    fn write(self, blocks: &mut [[f64; 4]], k: usize, width: usize);
+    /// Reads as many numbers as there are lanes.
+    ///
+    /// # Safety
+    /// They must be there.
+    unsafe fn read(numbers: *const f64) -> Self;
+    /// Writes them.
+    ///
+    /// # Safety
+    /// There must be room for them.
+    unsafe fn write(self, numbers: *mut f64);
+    /// Writes the lanes of the set bits, one after the other; what follows them, as far as one number a
+    /// lane would reach, is of no use.
+    ///
+    /// # Safety
+    /// There must be room for as many numbers as lanes.
+    unsafe fn pack(self, bits: u8, numbers: *mut f64);
+    /// Undoes it: the lanes of the set bits take one number after the other, the rest are zero.
+    ///
+    /// # Safety
+    /// There must be as many numbers as lanes.
+    unsafe fn unpack(numbers: *const f64, bits: u8) -> Self;
+    /// Packs as many indices as there are lanes.
+    ///
+    /// # Safety
+    /// There must be as many of them, and room for as many.
+    unsafe fn pack_indices(indices: *const u32, bits: u8, packed: *mut u32);
+    /// Adds the rows of pair `p` to those of one grain, and to those of another with the signs of all but the
+    /// second row changed.
+    ///
+    /// # Safety
+    /// Both must be as many rows of four as `rows`.
+    #[inline(always)]
+    unsafe fn add_pair<const ROWS: usize>(
+        rows: &[[Self; 4]; ROWS],
+        p: usize,
+        own: *mut f64,
+        other: *mut f64,
+    ) {
+        for (k, rows) in rows.iter().enumerate() {
+            let row = Self::pair(rows, p);
+            // SAFETY: the caller's promise.
+            unsafe {
+                let own = own.add(4 * k);
+                (Self::Row::read(own) + row).write(own);
+            }
+        }
+        for (k, rows) in rows.iter().enumerate() {
+            let row = Self::pair(rows, p);
+            // SAFETY: the caller's promise.
+            unsafe {
+                let other = other.add(4 * k);
+                let before = Self::Row::read(other);
+                let after = if k == 1 { before + row } else { before - row };
+                after.write(other);
+            }
+        }
+    }
+    /// The row of pair `p` out of such rows.
+    fn pair(rows: &[Self; 4], p: usize) -> Self::Row;
     /// Which lanes of a mask are set, the first by the lowest bit.
     fn lanes(mask: Self::Mask) -> u8;
     /// The largest number.
     fn largest(self) -> f64;
+}
+
+/// Packs four indices.
+///
+/// # Safety
+/// There must be four of them, and room for four.
+#[inline(always)]
+unsafe fn pack_four(indices: *const u32, bits: u8, packed: *mut u32) {
+    let (mut four, mut count) = ([0; 4], 0);
+    for k in 0..4 {
+        // SAFETY: the caller's promise.
+        four[count & 3] = unsafe { *indices.add(k) };
+        count += usize::from(bits >> k & 1);
+    }
+    // SAFETY: the caller's promise.
+    unsafe { packed.cast::<[u32; 4]>().write_unaligned(four) }
+}
+
+/// Eight numbers that share a line of the cache.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[repr(C, align(64))]
+pub struct Eight(pub [f64; 8]);
+
+/// The numbers of eights in a row.
+#[inline(always)]
+pub fn flat(eights: &[Eight]) -> &[f64] {
+    // SAFETY: an eight is eight numbers and nothing else.
+    unsafe { std::slice::from_raw_parts(eights.as_ptr().cast(), 8 * eights.len()) }
+}
+
+/// The same to be changed.
+#[inline(always)]
+pub fn flat_mut(eights: &mut [Eight]) -> &mut [f64] {
+    // SAFETY: an eight is eight numbers and nothing else.
+    unsafe { std::slice::from_raw_parts_mut(eights.as_mut_ptr().cast(), 8 * eights.len()) }
 }
 
 /// A vector in space, each component a lane.
@@ -228,7 +308,8 @@ impl Width {
     pub fn present() -> impl Iterator<Item = Width> {
         #[cfg(target_arch = "x86_64")]
         let wider = {
-            let avx2 = std::arch::is_x86_feature_detected!("avx2");
+            let avx2 = std::arch::is_x86_feature_detected!("avx2")
+                && std::arch::is_x86_feature_detected!("popcnt");
             let avx512 = avx2
                 && std::arch::is_x86_feature_detected!("avx512f")
                 && std::arch::is_x86_feature_detected!("avx512dq")
@@ -268,27 +349,74 @@ mod tests {
             .map(|r| std::array::from_fn(|c| f64::from(10 * r + c as i32)))
             .collect();
         let at: Vec<u32> = (0..L::WIDTH as u32).rev().collect();
-        let columns = L::transpose(L::gather(&rows, &at));
-        let mut block = vec![[0.0; 4]; L::WIDTH / 4];
-        columns[2].write(&mut block, 0, 1);
+        let gather = || {
+            // SAFETY: eight rows, and numbers below that.
+            unsafe { L::gather(rows.as_flattened().as_ptr(), at.as_ptr()) }
+        };
+        let columns = L::transpose(gather());
+        let written = |lanes: L| {
+            let mut numbers = vec![0.0; L::WIDTH];
+            // SAFETY: as many as lanes.
+            unsafe { lanes.write(numbers.as_mut_ptr()) };
+            numbers
+        };
         let expected: Vec<f64> = at.iter().map(|&r| f64::from(10 * r + 2)).collect();
-        assert_eq!(block.as_flattened(), expected);
+        assert_eq!(written(columns[2]), expected);
         assert_eq!(columns[2].largest(), expected[0]);
-        let again = L::read(&block, 0, 1);
+        // SAFETY: as many as lanes.
+        let again = unsafe { L::read(expected.as_ptr()) };
         assert_eq!(
             L::lanes(again.less(columns[3])),
             (1u16 << L::WIDTH).wrapping_sub(1) as u8
         );
         assert_eq!(L::lanes(again.less(L::splat(25.0))).count_ones(), 3);
-        let mut out = vec![[0.0; 4]; 2 * L::WIDTH];
-        L::scatter(L::transpose(columns), &mut out, 1, 2);
-        let last = L::gather(&rows, &at)[0].splat_last() + L::repeat(&[0.0, 1.0, 2.0, 3.0]);
-        for (k, &r) in at.iter().enumerate() {
-            assert_eq!(out[2 * k + 1], rows[r as usize]);
+        for bits in 0..(1u16 << L::WIDTH) {
+            let set = |k: &usize| bits >> k & 1 == 1;
+            let lanes: Vec<usize> = (0..L::WIDTH).filter(set).collect();
+            let (mut packed, mut indices) = (vec![0.0; L::WIDTH], vec![0; L::WIDTH]);
+            // SAFETY: as many as lanes.
+            let unpacked = unsafe {
+                again.pack(bits as u8, packed.as_mut_ptr());
+                L::pack_indices(at.as_ptr(), bits as u8, indices.as_mut_ptr());
+                L::unpack(packed.as_ptr(), bits as u8)
+            };
+            for (k, &lane) in lanes.iter().enumerate() {
+                assert_eq!((packed[k], indices[k]), (expected[lane], at[lane]));
+            }
+            for (k, &number) in written(unpacked).iter().enumerate() {
+                assert_eq!(number, if set(&k) { expected[k] } else { 0.0 });
+            }
         }
-        L::scatter([last; 4], &mut out, 0, 2);
+        let back = L::transpose(columns);
+        let last = gather()[0].splat_last() + L::repeat(&[0.0, 1.0, 2.0, 3.0]);
+        let mut row = [0.0; 4];
+        for (p, &r) in at.iter().enumerate() {
+            let pair = L::pair(&back, p);
+            pair.store(&mut row);
+            assert_eq!(row, rows[r as usize]);
+            assert_eq!(pair.sum_of_three(), row[0] + row[1] + row[2]);
+        }
+        L::pair(&[last; 4], 0).store(&mut row);
         let end = rows[L::WIDTH - 1][3];
-        assert_eq!(out[0], [end, end + 1.0, end + 2.0, end + 3.0]);
+        assert_eq!(row, [end, end + 1.0, end + 2.0, end + 3.0]);
+        sides::<L, 2>(&rows, &back);
+        sides::<L, 3>(&rows, &back);
+    }
+
+    /// Sums of both sides of pairs.
+    fn sides<L: Lanes, const ROWS: usize>(rows: &[[f64; 4]], back: &[L; 4]) {
+        for p in 0..L::WIDTH {
+            let (mut own, mut other) = ([[1.0; 4]; ROWS], [[2.0; 4]; ROWS]);
+            let [a, b] = [&mut own, &mut other].map(|sum| sum.as_flattened_mut().as_mut_ptr());
+            // SAFETY: as many rows.
+            unsafe { L::add_pair(&[*back; ROWS], p, a, b) };
+            let row = rows[L::WIDTH - 1 - p];
+            for k in 0..ROWS {
+                let sign = if k == 1 { 1.0 } else { -1.0 };
+                assert_eq!(own[k], row.map(|x| 1.0 + x));
+                assert_eq!(other[k], row.map(|x| 2.0 + sign * x));
+            }
+        }
     }
 
     #[test]
@@ -307,13 +435,13 @@ mod tests {
     }
 
     #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2")]
+    #[target_feature(enable = "avx2,popcnt")]
     unsafe fn there_and_back_avx2() {
         there_and_back::<avx2::Avx2>();
     }
 
     #[cfg(target_arch = "x86_64")]
-    #[target_feature(enable = "avx2,avx512f,avx512dq,avx512vl")]
+    #[target_feature(enable = "avx2,popcnt,avx512f,avx512dq,avx512vl")]
     unsafe fn there_and_back_avx512() {
         there_and_back::<avx512::Avx512>();
     }

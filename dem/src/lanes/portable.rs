@@ -1,6 +1,6 @@
 //! Lanes in plain Rust.
 
-use super::{Lane, Lanes, Lanes4, Row};
+use super::{Lane, Lanes, Lanes4};
 use std::ops::{Add, Div, Mul, Neg, Sub};
 
 /// Four lanes in plain Rust, for processors without AVX2.
@@ -97,14 +97,21 @@ impl Lanes4 for Portable {
     fn splat_last(self) -> Self {
         Portable([self.0[3]; 4])
     }
+    #[inline(always)]
+    fn sum_of_three(self) -> f64 {
+        self.0[0] + self.0[1] + self.0[2]
+    }
 }
 
 impl Lanes for Portable {
     const WIDTH: usize = 4;
     type Row = Self;
     #[inline(always)]
-    fn gather(of: &[impl Row], at: &[u32]) -> [Self; 4] {
-        std::array::from_fn(|r| Portable(of[at[r] as usize].read()))
+    unsafe fn gather(rows: *const f64, at: *const u32) -> [Self; 4] {
+        std::array::from_fn(|r| {
+            // SAFETY: the caller's promise.
+            unsafe { Self::read(rows.add(4 * *at.add(r) as usize)) }
+        })
     }
     #[inline(always)]
     fn repeat(row: &[f64; 4]) -> Self {
@@ -119,18 +126,45 @@ impl Lanes for Portable {
         Lanes4::splat_last(self)
     }
     #[inline(always)]
-    fn scatter(rows: [Self; 4], to: &mut [[f64; 4]], at: usize, stride: usize) {
-        for (r, row) in rows.into_iter().enumerate() {
-            to[at + r * stride] = row.0;
+    fn pair(rows: &[Self; 4], p: usize) -> Self {
+        rows[p & 3]
+    }
+    #[inline(always)]
+    unsafe fn read(numbers: *const f64) -> Self {
+        // SAFETY: the caller's promise.
+        Portable(unsafe { numbers.cast::<[f64; 4]>().read() })
+    }
+    #[inline(always)]
+    unsafe fn write(self, numbers: *mut f64) {
+        // SAFETY: the caller's promise.
+        unsafe { numbers.cast::<[f64; 4]>().write(self.0) }
+    }
+    #[inline(always)]
+    unsafe fn pack(self, bits: u8, numbers: *mut f64) {
+        let (mut packed, mut count) = ([0.0; 4], 0);
+        for (k, number) in self.0.into_iter().enumerate() {
+            packed[count & 3] = number;
+            count += usize::from(bits >> k & 1);
         }
+        // SAFETY: the caller's promise.
+        unsafe { Portable(packed).write(numbers) }
     }
     #[inline(always)]
-    fn read(blocks: &[[f64; 4]], k: usize, _: usize) -> Self {
-        Portable(blocks[k])
+    unsafe fn unpack(numbers: *const f64, bits: u8) -> Self {
+        // SAFETY: the caller's promise.
+        let Portable(packed) = unsafe { Self::read(numbers) };
+        let mut count = 0;
+        Portable(std::array::from_fn(|k| {
+            let set = bits >> k & 1 == 1;
+            let number = if set { packed[count & 3] } else { 0.0 };
+            count += usize::from(set);
+            number
+        }))
     }
     #[inline(always)]
-    fn write(self, blocks: &mut [[f64; 4]], k: usize, _: usize) {
-        blocks[k] = self.0;
+    unsafe fn pack_indices(indices: *const u32, bits: u8, packed: *mut u32) {
+        // SAFETY: the caller's promise.
+        unsafe { super::pack_four(indices, bits, packed) }
     }
     #[inline(always)]
     fn lanes(mask: [bool; 4]) -> u8 {

@@ -302,8 +302,8 @@ impl<'a> Places<'a> {
             let [a, b] = grid.across;
             for &i in &cells[a] {
                 for &j in &cells[b] {
-                    for &k in &cells[0] {
-                        let cell = grid.row_at([i, j]) * grid.cells[0] + k;
+                    for &k in &cells[grid.along] {
+                        let cell = grid.row_at([i, j]) * grid.row_cells() + k;
                         if level.meets(cell, &row, spec) {
                             return false;
                         }

@@ -77,7 +77,11 @@ impl Simulation {
             self.list_walls();
         }
         if self.reach.outdated(&self.list) {
-            self.make_reach(false);
+            if self.reach.is_uneven() {
+                self.deal_anew();
+            } else {
+                self.make_reach(false);
+            }
         }
         Ok(())
     }
@@ -131,13 +135,18 @@ impl Simulation {
         let (cell, listed) = (self.cell(), self.skin + self.hold);
         self.list
             .build(&mut self.grains, &cell, listed, self.parallel);
-        let list = &self.list;
+        let (list, team) = (&self.list, self.team.share());
         let place = |old: u32| match remaining(old) {
             GONE => GONE,
             old => list.new_index(old),
         };
-        self.touching
-            .collect(&mut self.reach, &mut self.grains, self.layout, &place);
+        self.touching.collect(
+            &mut self.reach,
+            &mut self.grains,
+            self.layout,
+            &team,
+            &place,
+        );
         self.wall_contacts.take_down(place);
         self.list_walls();
         self.settle_loads();
@@ -161,20 +170,39 @@ impl Simulation {
     /// Makes the list of pairs within reach anew: in new chunks, with the histories in `touching`, or
     /// in the same ones with the histories it has.
     pub(super) fn make_reach(&mut self, cut: bool) {
+        let team = self.team.share();
+        if cut {
+            let grains = self.grains.len();
+            let ghosts = self.reach.cut(&self.list, grains, self.parallel, &team);
+            self.grains.lay_ghosts(ghosts);
+        }
+        for chunk in &self.reach.chunks {
+            self.grains.copy_ghosts(&chunk.ghosts, chunk.first_ghost);
+        }
         let making = Making {
             grains: &self.grains,
             list: &self.list,
             images: Images::of(&self.cell()),
+            team: &team,
+            lanes: self.width,
             width: self.layout.history,
             hold: self.hold,
         };
         if cut {
-            self.reach.cut(&making, &self.touching, self.parallel);
+            self.reach.deal(&making, &self.touching);
             self.touching.close(&mut self.grains.spare);
         } else {
             self.reach.renew(&making);
         }
         self.current = false;
+    }
+
+    /// Deals the grains out to threads anew.
+    pub(super) fn deal_anew(&mut self) {
+        let (reach, grains, team) = (&mut self.reach, &mut self.grains, self.team.share());
+        self.touching
+            .collect(reach, grains, self.layout, &team, &|i| i);
+        self.make_reach(true);
     }
 
     /// Takes up histories of touching contacts i < j, as a checkpoint has them.

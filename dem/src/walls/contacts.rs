@@ -5,12 +5,13 @@
 //! contacts that do not touch leave zeros. Steps cost only for grains that are listed.
 
 use super::mesh::{CONTACTS, Mesh, Offers};
-use super::{Foot, Shape, Standing};
+use super::{Foot, Shape, Standing, WallLoad};
 use crate::contact::{HISTORY_MAX, Interaction, Lever, Step, Touch};
 use crate::domain::Domain;
 use crate::grains::{Grains, vector};
 use crate::lanes::Vec3;
 use crate::neighbours::Row;
+use crate::team::Team;
 use nalgebra::Vector3;
 use std::ops::Range;
 
@@ -81,6 +82,23 @@ struct Block {
 /// from the other side, or put into the plate.
 const THROUGH: f64 = 0.5;
 
+/// Grains whose contacts are added up together before parts are: the same for any number of threads.
+const PART: usize = 1024;
+
+/// Most threads that contacts are shared out over.
+const SHARES: usize = 32;
+
+/// Contacts that are evaluated on one thread: those of some parts.
+struct Share<'a> {
+    /// Number of the first contact.
+    first: usize,
+    contacts: &'a mut [WallContact],
+    parts: &'a [usize],
+    loads: &'a mut [WallLoad],
+    /// Largest overlap over the radius.
+    deepest: f64,
+}
+
 /// What a step reads besides the walls.
 #[derive(Clone, Copy)]
 pub(crate) struct Scene<'a> {
@@ -88,6 +106,9 @@ pub(crate) struct Scene<'a> {
     pub domain: &'a Domain,
     pub lever: Lever,
     pub step: Step,
+    /// Threads that contacts are shared out over.
+    pub threads: usize,
+    pub team: &'a Team,
 }
 
 /// Where and how a grain meets a wall.
@@ -119,6 +140,10 @@ pub(crate) struct WallContacts {
     time_then: f64,
     blocks: Vec<Block>,
     near: Vec<Near>,
+    /// Where the contacts of each part of the grains begin, and where those of the last end.
+    parts: Vec<usize>,
+    /// For each part and wall, what the wall carries of it.
+    loads: Vec<WallLoad>,
     old: Vec<WallContact>,
     /// Contacts as they were before they were looked at out of turn.
     before: Vec<WallContact>,
@@ -132,6 +157,11 @@ impl WallContacts {
             return &[];
         }
         &self.contacts[self.first[grain] as usize..self.first[grain + 1] as usize]
+    }
+
+    /// Whether no grain is near a wall.
+    pub fn is_empty(&self) -> bool {
+        self.contacts.is_empty()
     }
 
     /// All contacts that touch.
@@ -184,6 +214,7 @@ impl WallContacts {
         self.near.clear();
         self.first.clear();
         self.clearance.clear();
+        self.parts.clear();
         if walls.is_empty() {
             return;
         }
@@ -192,6 +223,9 @@ impl WallContacts {
             let from = self.clearance.len();
             self.clearance.resize(from + walls.len(), f64::INFINITY);
             for g in row.start..row.end {
+                if (g as usize).is_multiple_of(PART) {
+                    self.parts.push(self.contacts.len());
+                }
                 let x = &grains.place[g as usize];
                 for (w, wall) in walls.iter().enumerate() {
                     let key = (g, w as u32);
@@ -205,6 +239,10 @@ impl WallContacts {
                 self.first.push(self.contacts.len() as u32);
             }
         }
+        let parts = self.parts.len();
+        self.parts.push(self.contacts.len());
+        self.loads.clear();
+        self.loads.resize(parts * walls.len(), WallLoad::default());
         self.travel_then.clear();
         self.travel_then.extend_from_slice(age.travel);
         self.time_then = age.time;
@@ -303,27 +341,94 @@ impl WallContacts {
         scene: &Scene,
     ) -> f64 {
         for wall in walls.iter_mut() {
-            wall.load = Default::default();
+            wall.load = WallLoad::default();
         }
-        let (mut deepest, mut k): (f64, usize) = (0.0, 0);
-        while let Some(c) = self.contacts.get_mut(k) {
-            if c.block != ALONE {
-                let block = &self.blocks[c.block as usize];
-                let rows = &mut self.contacts[block.contacts.clone()];
-                let near = &self.near[block.near.clone()];
-                deepest = deepest.max(meet_mesh(rows, near, law, walls, scene));
-                k = block.contacts.end;
-                continue;
+        if self.contacts.is_empty() {
+            return 0.0;
+        }
+        let standing = &*walls;
+        let (blocks, near) = (&self.blocks, &self.near);
+        let mut shares: [Option<Share>; SHARES] = std::array::from_fn(|_| None);
+        let count = scene.threads.clamp(1, SHARES);
+        let total = self.contacts.len();
+        let (mut contacts, mut loads) = (self.contacts.as_mut_slice(), self.loads.as_mut_slice());
+        let mut part = 0;
+        for (s, share) in shares[..count].iter_mut().enumerate() {
+            let first = self.parts[part];
+            let upto = total * (s + 1) / count;
+            let behind = self.parts[part..].partition_point(|&start| start < upto);
+            let end = (part + behind).min(self.parts.len() - 1);
+            let (own, rest) = contacts.split_at_mut(self.parts[end] - first);
+            let (own_loads, rest_loads) = loads.split_at_mut((end - part) * standing.len());
+            *share = Some(Share {
+                first,
+                contacts: own,
+                parts: &self.parts[part..=end],
+                loads: own_loads,
+                deepest: 0.0,
+            });
+            (contacts, loads, part) = (rest, rest_loads, end);
+        }
+        let parallel = count > 1 && total >= CONTACTS_TO_SHARE;
+        scene.team.each(parallel, &mut shares[..count], &|share| {
+            if let Some(share) = share {
+                share.evaluate(law, standing, blocks, near, scene);
             }
-            let (grain, wall) = (c.grain as usize, &mut walls[c.wall as usize]);
-            let x = &scene.grains.place[grain];
-            let seen = wall.seen(&vector(x), scene.domain);
-            let foot = wall.foot(&seen);
-            let meeting = Meeting { grain, seen, foot };
-            deepest = deepest.max(c.evaluate(law, wall, &meeting, scene));
-            k += 1;
+        });
+        let depths = shares.iter().flatten().map(|share| share.deepest);
+        let deepest = depths.fold(0.0, f64::max);
+        for loads in self.loads.chunks_exact(walls.len()) {
+            for (wall, load) in walls.iter_mut().zip(loads) {
+                wall.load.force += load.force;
+                wall.load.torque += load.torque;
+            }
         }
         deepest
+    }
+}
+
+/// Fewest contacts with walls for which a step goes to several threads.
+const CONTACTS_TO_SHARE: usize = 64;
+
+impl Share<'_> {
+    fn evaluate<I: Interaction>(
+        &mut self,
+        law: &I,
+        walls: &[Standing],
+        blocks: &[Block],
+        near: &[Near],
+        scene: &Scene,
+    ) {
+        self.loads.fill(WallLoad::default());
+        for (part, loads) in self
+            .parts
+            .windows(2)
+            .zip(self.loads.chunks_exact_mut(walls.len()))
+        {
+            let (mut k, end) = (part[0] - self.first, part[1] - self.first);
+            while k < end {
+                let c = &mut self.contacts[k];
+                if c.block != ALONE {
+                    let block = &blocks[c.block as usize];
+                    let own = block.contacts.start - self.first..block.contacts.end - self.first;
+                    k = own.end;
+                    let near = &near[block.near.clone()];
+                    let rows = &mut self.contacts[own];
+                    let depth = meet_mesh(rows, near, law, walls, loads, scene);
+                    self.deepest = self.deepest.max(depth);
+                    continue;
+                }
+                let (grain, wall) = (c.grain as usize, &walls[c.wall as usize]);
+                let x = &scene.grains.place[grain];
+                let seen = wall.seen(&vector(x), scene.domain);
+                let foot = wall.foot(&seen);
+                let meeting = Meeting { grain, seen, foot };
+                let load = &mut loads[c.wall as usize];
+                let depth = c.evaluate(law, wall, load, &meeting, scene);
+                self.deepest = self.deepest.max(depth);
+                k += 1;
+            }
+        }
     }
 }
 
@@ -336,10 +441,12 @@ fn meet_mesh<I: Interaction>(
     rows: &mut [WallContact],
     near: &[Near],
     law: &I,
-    walls: &mut [Standing],
+    walls: &[Standing],
+    loads: &mut [WallLoad],
     scene: &Scene,
 ) -> f64 {
-    let (g, wall) = (rows[0].grain, &mut walls[rows[0].wall as usize]);
+    let (g, wall) = (rows[0].grain, &walls[rows[0].wall as usize]);
+    let load = &mut loads[rows[0].wall as usize];
     let grain = g as usize;
     let x = &scene.grains.place[grain];
     let (mut before, mut known) = ([rows[0]; CONTACTS], 0);
@@ -384,7 +491,7 @@ fn meet_mesh<I: Interaction>(
                 normal,
             },
         };
-        deepest = deepest.max(row.evaluate(law, wall, &meeting, scene));
+        deepest = deepest.max(row.evaluate(law, wall, load, &meeting, scene));
     }
     deepest
 }
@@ -421,7 +528,8 @@ impl WallContact {
     fn evaluate<I: Interaction>(
         &mut self,
         law: &I,
-        wall: &mut Standing,
+        wall: &Standing,
+        load: &mut WallLoad,
         meeting: &Meeting,
         scene: &Scene,
     ) -> f64 {
@@ -477,8 +585,8 @@ impl WallContact {
         (self.touching, self.overlap, self.normal) = (true, overlap, normal.0);
         let [force, torque, moment] = self.slot.map(|row| vector(&row));
         // The grain's torque is R times the second row plus the third: what it gains, the wall loses.
-        wall.load.force -= force;
-        wall.load.torque -= meeting.seen.cross(&force) + torque * x[3] + moment;
+        load.force -= force;
+        load.torque -= meeting.seen.cross(&force) + torque * x[3] + moment;
         if begins && wall.wall.shape.is_plate() && overlap > THROUGH * x[3] {
             // By the radius it was pressed through, the overlap is the rest of the diameter.
             return 2.0 - overlap * s[3];
