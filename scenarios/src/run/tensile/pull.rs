@@ -194,7 +194,7 @@ impl TensileScene {
         let mut hanging = vec![false; grains.len()];
         let clamped = |k: &usize| grains[*k].fixed || grains[*k].position.z > self.clamp_foot();
         for fragment in fragments::joined(&masses, &pairs) {
-            if fragment.grains.iter().any(|k| clamped(k)) {
+            if fragment.grains.iter().any(clamped) {
                 fragment.grains.iter().for_each(|&k| hanging[k] = true);
             }
         }
@@ -225,11 +225,8 @@ impl TensileScene {
                 continue;
             }
             let rises = pull.look((time, momentum(own)), area, (step, self.pull.patience));
-            let held: Vec<u32> = pull.layer.clone();
-            let held: Vec<u32> = held
-                .into_iter()
-                .filter(|id| hanging[*id as usize])
-                .collect();
+            let layer = pull.layer.iter().copied();
+            let held: Vec<u32> = layer.filter(|id| hanging[*id as usize]).collect();
             if held.is_empty() {
                 pull.over = 1.0;
             }
