@@ -8,7 +8,6 @@ mod boulder;
 pub mod chute;
 pub mod collapse;
 mod comet;
-mod comet_ball;
 mod comet_block;
 pub mod energy_table;
 pub mod grain_table;

@@ -72,10 +72,10 @@ fn small_samples_break_at_a_stress_of_the_papers_order() {
     assert!(value(&whole, "strength") < strength);
 }
 
-/// A boulder of some 200 parcels for a few seconds.
+/// A boulder of some 200 parcels for a few seconds; softer grains than the paper's allow longer steps.
 const BOULDER: [&str; 4] = [
     "coarse_graining=150",
-    "preparation.margin=1.1",
+    "contact.youngs_modulus=1e7",
     "impact.duration=6",
     "output.frames=0",
 ];
@@ -117,8 +117,10 @@ fn small_grains_survive_the_fall_that_large_ones_do_not() {
     let fragments = folder.path().join("coarse/fragments.csv");
     let (header, rows) = table(&fragments);
     let share = header.iter().position(|n| n == "mass_share").unwrap();
-    assert_eq!(rows[0][share], largest(&coarse));
-    assert!(rows.iter().map(|row| row[share]).sum::<f64>() <= 1.0 + 1e-12);
+    // A single grain can be heavier than every fragment of several; the table has only those.
+    let shares: Vec<f64> = rows.iter().map(|row| row[share]).collect();
+    assert!(shares[0] <= largest(&coarse) && shares.is_sorted_by(|a, b| a >= b));
+    assert!(shares.iter().sum::<f64>() <= 1.0 + 1e-12);
     let pictures = |out: &str| {
         let entries = std::fs::read_dir(folder.path().join(out)).unwrap();
         let names = entries.map(|e| e.unwrap().file_name().into_string().unwrap());

@@ -1,12 +1,12 @@
 //! A boulder of cometary material dropped on a plane.
 //!
-//! The boulder is cut out of a ball of the material (`comet_ball.rs`), bonded where it is sintered, put on the
+//! The boulder is cut out of a block of the material (`comet_block.rs`), bonded where it is sintered, put on the
 //! ground and given its impact velocity at once (Kappel et al. 2020, §3.1). A fragment is what hangs together
 //! by contacts that were there before the impact and have not opened. The run is over when everything rests,
 //! or when nothing has come apart for as long as the boulder took to move by its own diameter.
 
 use super::comet::{self, Comet};
-use super::comet_ball::CometBall;
+use super::comet_block::CometBlock;
 use super::world::fragments::{self, Fragment};
 use super::world::{Course, Expected, Ran, Recipe, Workshop, World};
 use crate::failure::Failure;
@@ -57,11 +57,11 @@ impl BoulderScene {
         }
     }
 
-    fn ball(&self) -> CometBall<'_> {
-        CometBall {
+    fn block(&self) -> CometBlock<'_> {
+        CometBlock {
             comet: self.comet(),
             preparation: &self.preparation,
-            radius: self.radius(),
+            needed: Vector3::repeat(self.diameter),
         }
     }
 
@@ -170,7 +170,7 @@ impl Recipe for BoulderScene {
     }
 
     fn prepare(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure> {
-        self.ball().make(shop, Vector3::zeros(), origin)?;
+        self.block().make(shop, origin)?;
         let ball = |radius: f64| Region::Ball {
             center: Vector3::zeros(),
             radius,

@@ -70,7 +70,7 @@ pub fn relaxation(materials: &Materials) -> Relaxation {
 }
 
 /// Depth at which two mean grains of Hertz' law rest under their cohesion, over their diameter.
-pub fn depth(materials: &Materials) -> f64 {
+fn depth(materials: &Materials) -> f64 {
     let d = diameter(materials);
     match materials.first_law().normal {
         Normal::Hertz(hertz) => {

@@ -1,6 +1,6 @@
 //! Keys of the boulder drop.
 
-use super::comet::{CometKeys, CometPreparationKeys};
+use super::comet::{CometBlockKeys, CometKeys};
 use super::world::{BondKeys, Materials, OutputKeys, StepKeys, SurfaceKeys};
 use super::{LawKeys, SceneError};
 use schemars::JsonSchema;
@@ -27,7 +27,7 @@ pub struct BoulderScene {
     /// What it is made of.
     pub material: CometKeys,
     /// How it is made.
-    pub preparation: CometPreparationKeys,
+    pub preparation: CometBlockKeys,
     /// How it hits the ground.
     pub impact: BoulderImpactKeys,
     /// What the ground is like.

@@ -82,36 +82,6 @@ pub struct CometKeys {
     pub bulk_density: f64,
 }
 
-/// How a ball of the material is made.
-#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
-#[serde(deny_unknown_fields)]
-pub struct CometPreparationKeys {
-    /// E while grains are pulled together (Pa): soft grains allow long steps; then it is raised in steps.
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e13))]
-    pub youngs_modulus: f64,
-    /// Restitution while the ball is made.
-    #[schemars(extend("minimum" = 0.01, "maximum" = 1.0))]
-    pub restitution: f64,
-    /// Radius of the ball over what is needed: its rim is loose.
-    #[schemars(extend("minimum" = 1.0, "maximum" = 2.0))]
-    pub margin: f64,
-    /// First pull to the centre, by the pressure that it lays on the middle of the ball over Rumpf's
-    /// strength; it grows until the porosity is reached.
-    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0))]
-    pub pull: f64,
-}
-
-impl CometPreparationKeys {
-    /// What grains are like meanwhile.
-    pub fn softness(&self) -> Softness {
-        Softness {
-            youngs_modulus: self.youngs_modulus,
-            restitution: self.restitution,
-            friction: None,
-        }
-    }
-}
-
 /// How a block of the material is made.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
