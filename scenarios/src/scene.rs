@@ -36,7 +36,7 @@ pub use bed::Pace;
 pub use boulder::BoulderScene;
 pub use chute::ChuteScene;
 pub use collapse::{CollapseGrid, CollapseModel, CollapseScene, CollapseSolver, ThinLayerKind};
-pub use comet::{CometKeys, CometPreparationKeys, MixKind};
+pub use comet::{CometBlockKeys, CometKeys, MixKind, Softness};
 pub use error::SceneError;
 pub use grains::GrainsScene;
 pub use impact::{ImpactScene, RollingKeys};

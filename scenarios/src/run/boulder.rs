@@ -1,10 +1,12 @@
 //! A boulder of cometary material dropped on a plane.
 //!
-//! The boulder is cut out of a ball of the material (`comet_ball.rs`), bonded where it is sintered, put on the
+//! The boulder is cut out of a block of the material (`comet_block.rs`), bonded where it is sintered, put on the
 //! ground and given its impact velocity at once (Kappel et al. 2020, §3.1). A fragment is what hangs together
-//! by contacts that were there before the impact and have not opened.
+//! by contacts that were there before the impact and have not opened. The run is over when everything rests,
+//! or when nothing has come apart for as long as the boulder took to move by its own diameter.
 
-use super::comet_ball::{self, CometBall};
+use super::comet::{self, Comet};
+use super::comet_block::CometBlock;
 use super::world::fragments::{self, Fragment};
 use super::world::{Course, Expected, Ran, Recipe, Workshop, World};
 use crate::failure::Failure;
@@ -46,14 +48,28 @@ impl BoulderScene {
         0.5 * self.diameter
     }
 
-    fn ball(&self) -> CometBall<'_> {
-        CometBall {
+    fn comet(&self) -> Comet<'_> {
+        Comet {
             material: &self.material,
-            preparation: &self.preparation,
+            soft: self.preparation.softness(),
             contact: &self.contact,
             coarse_graining: self.coarse_graining,
-            radius: self.radius(),
         }
+    }
+
+    fn block(&self) -> CometBlock<'_> {
+        CometBlock {
+            comet: self.comet(),
+            preparation: &self.preparation,
+            needed: Vector3::repeat(self.diameter),
+        }
+    }
+
+    /// Time without a contact that opens after which nothing more comes apart (s): that in which the boulder
+    /// moved by its own diameter. Pieces that have been thrown up fly for minutes under so little gravity; they
+    /// come down more slowly than they went up.
+    fn quiet(&self) -> f64 {
+        self.diameter / self.impact.speed
     }
 
     fn velocity(&self) -> Vector3<f64> {
@@ -62,21 +78,35 @@ impl BoulderScene {
     }
 }
 
-/// The recipe's memory: the energy of the impact (J), then the pairs that touched before it.
+/// Numbers of the memory before the pairs: the energy of the impact (J), the fewest contacts that have held
+/// so far, and when the last of them opened (s).
+const HEAD: usize = 3;
+
+/// The recipe's memory: its head, then the pairs that touched before the impact.
 fn remember(simulation: &mut Simulation) -> Vec<f64> {
     let energy = simulation.energy().kinetic();
     let pairs = fragments::touching(simulation);
+    let head = [energy, pairs.len() as f64, simulation.time()];
     let flat = pairs.into_iter().flatten().map(f64::from);
-    std::iter::once(energy).chain(flat).collect()
+    head.into_iter().chain(flat).collect()
+}
+
+/// Pairs that touched before the impact, by the recipe's memory.
+fn pairs(state: &[f64]) -> impl ExactSizeIterator<Item = [u32; 2]> {
+    let pairs = state.get(HEAD..).unwrap_or_default().as_chunks::<2>().0;
+    pairs.iter().map(|pair| pair.map(|id| id as u32))
+}
+
+/// Those of them that touch now.
+fn held(simulation: &mut Simulation, state: &[f64]) -> Vec<[u32; 2]> {
+    let now: BTreeSet<[u32; 2]> = fragments::touching(simulation).into_iter().collect();
+    pairs(state).filter(|pair| now.contains(pair)).collect()
 }
 
 /// Fragments now, and the share of the contacts of the start that have held.
 fn fragments_now(simulation: &mut Simulation, state: &[f64]) -> (Vec<Fragment>, f64) {
-    let now: BTreeSet<[u32; 2]> = fragments::touching(simulation).into_iter().collect();
-    let pairs = state.get(1..).unwrap_or_default().as_chunks::<2>().0;
-    let pairs = pairs.iter().map(|pair| pair.map(|id| id as u32));
-    let before = pairs.len();
-    let held: Vec<[u32; 2]> = pairs.filter(|pair| now.contains(pair)).collect();
+    let before = pairs(state).len();
+    let held = held(simulation, state);
     let masses: Vec<f64> = simulation.grain_list().iter().map(|g| g.mass()).collect();
     let share = held.len() as f64 / before.max(1) as f64;
     (fragments::joined(&masses, &held), share)
@@ -140,14 +170,14 @@ impl Recipe for BoulderScene {
     }
 
     fn prepare(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure> {
-        self.ball().make(shop, Vector3::zeros(), origin)?;
+        self.block().make(shop, origin)?;
         let ball = |radius: f64| Region::Ball {
             center: Vector3::zeros(),
             radius,
         };
         shop.trim(&ball(self.radius()), true)?;
-        let around = self.ball().last(origin)?;
-        let relaxation = comet_ball::relaxation(shop.materials);
+        let around = self.comet().last(origin)?;
+        let relaxation = comet::relaxation(shop.materials);
         shop.relax(&around, &relaxation)?;
         shop.measure(&around, &ball(0.8 * self.radius()), relaxation.acceleration)?;
         let bottoms = shop.packing.grains.iter().map(|g| g.position.z - g.radius);
@@ -183,7 +213,7 @@ impl Recipe for BoulderScene {
     fn expected(&self, materials: &Materials) -> Expected {
         let volume = 4.0 / 3.0 * PI * self.radius().powi(3);
         Expected {
-            grains: self.ball().grains_in(volume, materials),
+            grains: self.comet().grains_in(volume, materials),
             preparation: None,
             duration: self.impact.duration,
         }
@@ -220,9 +250,13 @@ impl Recipe for BoulderScene {
         if state.is_empty() {
             *state = remember(simulation);
         }
-        // The least of a bounce is no rest: the boulder has to carry its weight.
-        let kinetic = simulation.energy().kinetic();
-        Ok(if kinetic < REST * state[0] {
+        let held = held(simulation, state).len() as f64;
+        let time = simulation.time();
+        if held < state[1] {
+            (state[1], state[2]) = (held, time);
+        }
+        let rests = simulation.energy().kinetic() < REST * state[0];
+        Ok(if rests || time - state[2] > self.quiet() {
             Course::Over
         } else {
             Course::On
@@ -283,9 +317,16 @@ impl Recipe for BoulderScene {
         let kinetic = ran.simulation.energy().kinetic() / ran.state[0];
         let left = Quantity::new(kinetic, "1").from("kinetic energy over that of the impact");
         summary.put("kinetic_energy_left", left);
-        if kinetic >= REST {
+        let (time, last) = (ran.simulation.time(), ran.state[2]);
+        summary.put(
+            "last_opening",
+            Quantity::new(last, "s").from("when the last contact of the start opened"),
+        );
+        if kinetic >= REST && time - last <= self.quiet() {
             summary.remarks.push(format!(
-                "Not at rest at the end: {kinetic:.1e} of the impact's kinetic energy are left."
+                "Still coming apart at the end: a contact opened {:.1} s before it, and {kinetic:.1e} of the \
+                 impact's kinetic energy are left.",
+                time - last
             ));
         }
         summary.figures.push(Figure::history(

@@ -1,12 +1,16 @@
-//! A cylinder of cometary material pulled to its breaking point.
+//! Cylinders of cometary material pulled to their breaking point.
 //!
-//! The sample is cut out of a ball of the material (`comet_ball.rs`). Its head is held in a truncated cone; grains of its lowest layer are pulled downwards by a force that rises in
-//! steps, shared out by mass. The clamp feels the same force once the wave is through, until the sample
-//! breaks: the strength is the largest mean force of a step on the clamp over the cross-section
-//! (Kappel et al. 2020, §3.3).
-//! The pull is given in units of Rumpf's estimate of the strength.
+//! A sample is cut out of a block of the material (`comet_block.rs`). Its head is held in a truncated cone;
+//! grains of its lowest layer are pulled downwards by a force that rises in steps (`tensile/pull.rs`). The
+//! strength is the largest mean force on the clamp between two looks over the cross-section (Kappel et al.
+//! 2020, §3.3), and the largest pull that was carried stands beside it. Several samples, each with a seed of
+//! its own, hang side by side; the result is their mean with its standard error. The pull is given in units of
+//! Rumpf's estimate of the strength.
 
-use super::comet_ball::{self, CometBall};
+mod pull;
+mod sample;
+
+use super::comet;
 use super::world::fragments;
 use super::world::{Course, Expected, Ran, Recipe, Workshop, World};
 use crate::failure::Failure;
@@ -14,16 +18,12 @@ use crate::scene::world::{Materials, OutputKeys, Place, StepKeys};
 use crate::scene::{ClampKind, LawKeys, MixKind, TensileScene, layers};
 use crate::summary::{Figure, Quantity, Summary};
 use crate::table::Table;
-use colluvium_dem::preparation::{Packing, Relaxation, Rest};
-use colluvium_dem::walls::{Ends, Frustum};
-use colluvium_dem::{Load, Region, Side, Simulation, Snapshot, Wall};
-use nalgebra::Vector3;
+use colluvium_dem::preparation::{Packing, Relaxation, Rest, solid_fraction};
+use colluvium_dem::{Grain, Simulation, Snapshot};
+use nalgebra::{UnitQuaternion, Vector3};
+use pull::{BROKEN, LAG};
 use std::f64::consts::PI;
 
-/// Thickness of the layer that is pulled, and of the one that is gripped, in mean diameters.
-const LAYER: f64 = 1.5;
-/// The clamp's force has fallen below this share of its largest: the sample is broken.
-const BROKEN: f64 = 0.5;
 /// Weight that seats a sample in a wall, over its strength by Rumpf.
 const SEATING: f64 = 0.01;
 /// Damping of the seating, over √(g/d).
@@ -37,157 +37,15 @@ const KAPPEL: [(MixKind, f64); 3] = [
     (MixKind::OneToOne, 4.65),
 ];
 
-/// What the recipe remembers: a head, then the numbers of the grains that are pulled.
-#[derive(Clone, Copy, Debug, Default)]
-struct Memory {
-    /// Stress applied now (Pa).
-    applied: f64,
-    /// Momentum that the clamp had taken at the last look (N s), and when (s).
-    taken: f64,
-    time: f64,
-    /// Mean stress on the clamp since the look before (Pa).
-    stress: f64,
-    /// The largest so far, and the stress applied then (Pa).
-    strength: f64,
-    applied_then: f64,
-    /// Looks in a row at which the clamp felt little.
-    low: f64,
-}
-
-/// Looks in a row with little force on the clamp after which the sample counts as broken: waves pass.
-const LOOKS: f64 = 3.0;
-
-const HEAD: usize = 7;
-
-impl Memory {
-    fn read(state: &[f64]) -> Memory {
-        match *state {
-            [
-                applied,
-                taken,
-                time,
-                stress,
-                strength,
-                applied_then,
-                low,
-                ..,
-            ] => Memory {
-                applied,
-                taken,
-                time,
-                stress,
-                strength,
-                applied_then,
-                low,
-            },
-            _ => Memory::default(),
-        }
-    }
-
-    /// Whether the sample has broken.
-    fn is_over(&self) -> bool {
-        self.low >= LOOKS
-    }
-
-    fn write(&self, state: &mut [f64]) {
-        let head = [
-            self.applied,
-            self.taken,
-            self.time,
-            self.stress,
-            self.strength,
-            self.applied_then,
-            self.low,
-        ];
-        state[..HEAD].copy_from_slice(&head);
-    }
-}
-
 impl TensileScene {
-    fn radius(&self) -> f64 {
-        0.5 * self.sample.diameter
-    }
-
-    fn area(&self) -> f64 {
-        PI * self.radius().powi(2)
-    }
-
-    /// Radius of the clamp at its top (m).
-    fn top_radius(&self) -> f64 {
-        self.radius() + self.clamp.height * self.clamp.angle_degrees.to_radians().tan()
-    }
-
-    fn ball(&self) -> CometBall<'_> {
-        CometBall {
-            material: &self.material,
-            preparation: &self.preparation,
-            contact: &self.contact,
-            coarse_graining: self.coarse_graining,
-            radius: self
-                .radius()
-                .hypot(0.5 * self.sample.height)
-                .max(self.top_radius().hypot(0.5 * self.sample.height)),
-        }
-    }
-
-    /// Rumpf's strength (Pa).
-    fn rumpf(&self, materials: &Materials) -> f64 {
-        self.ball().rumpf(materials)
-    }
-
-    /// The cone from its lower end.
-    fn cone(&self, inset: f64) -> Region {
-        let radii = [self.radius(), self.top_radius()].map(|r| (r - inset).max(0.0));
-        Region::Frustum {
-            point: Vector3::new(0.0, 0.0, self.sample.height - self.clamp.height),
-            axis: Vector3::z(),
-            length: self.clamp.height,
-            radii,
-        }
-    }
-
-    /// The sample: a cylinder with its head.
-    fn shape(&self) -> Region {
-        let body = Region::All(vec![
-            Region::Cylinder {
-                point: Vector3::zeros(),
-                axis: Vector3::z(),
-                radius: self.radius(),
-            },
-            Region::Block {
-                lower: Vector3::new(f64::NEG_INFINITY, f64::NEG_INFINITY, 0.0),
-                upper: Vector3::new(f64::INFINITY, f64::INFINITY, self.sample.height),
-            },
-        ]);
-        Region::Any(vec![body, self.cone(0.0)])
-    }
-
-    /// Grains of the head that the clamp grips.
-    fn gripped(&self, diameter: f64) -> Region {
-        let slant = self.clamp.angle_degrees.to_radians().cos();
-        Region::All(vec![
-            self.cone(0.0),
-            Region::Outside(Box::new(self.cone(LAYER * diameter / slant))),
-        ])
-    }
-
-    fn wall(&self) -> Wall {
-        let foot = Vector3::new(0.0, 0.0, self.sample.height - self.clamp.height);
-        Wall::frustum(
-            foot,
-            Frustum {
-                axis: Vector3::z(),
-                // The side goes on above the sample, so that nothing touches its upper edge.
-                height: 2.0 * self.clamp.height,
-                radii: [self.radius(), 2.0 * self.top_radius() - self.radius()],
-                ends: Ends::Open(Side::Inside),
-            },
-        )
-    }
-
     /// Time between two steps of the pull (s).
     fn interval(&self) -> f64 {
         self.pull.step / self.pull.rate
+    }
+
+    /// Time of a pull to its limit that waits at every step (s).
+    fn longest(&self) -> f64 {
+        self.pull.patience * self.pull.limit / self.pull.rate
     }
 
     /// The paper's strength for these grains, where it has one (Pa).
@@ -208,7 +66,11 @@ impl TensileScene {
 impl Recipe for TensileScene {
     fn about(&self) -> String {
         format!(
-            "a cylinder of {}, {} m x {} m, is pulled to its breaking point (Kappel et al. 2020, §3.3)",
+            "{} of {}, {} m x {} m, pulled to the breaking point (Kappel et al. 2020, §3.3)",
+            match self.samples {
+                1 => "a cylinder".to_owned(),
+                n => format!("{n} cylinders"),
+            },
             self.material.mix.words(),
             self.sample.diameter,
             self.sample.height
@@ -261,51 +123,23 @@ impl Recipe for TensileScene {
     }
 
     fn prepare(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure> {
-        let middle = Vector3::new(0.0, 0.0, 0.5 * self.sample.height);
-        self.ball().make(shop, middle, origin)?;
-        let diameter = comet_ball::diameter(shop.materials);
-        let relaxation = comet_ball::relaxation(shop.materials);
-        shop.trim(&self.shape(), false)?;
-        let mut around = self.ball().last(origin)?;
-        match self.clamp.kind {
-            ClampKind::Gripped => {
-                shop.glue(&self.gripped(diameter))?;
-                shop.relax(&around, &relaxation)?;
-            }
-            ClampKind::Wall => {
-                around.walls = vec![self.wall()];
-                shop.relax(&around, &relaxation)?;
-                let weight = SEATING * self.rumpf(shop.materials);
-                let g = weight / (self.material.bulk_density * self.sample.height);
-                around.gravity = Vector3::new(0.0, 0.0, -g);
-                let seating = Relaxation {
-                    damping: SEATING_DAMPING,
-                    rest: Rest {
-                        kinetic: 1e-8,
-                        unbalanced: 1e9,
-                    },
-                    ..Relaxation::under(g)
-                };
-                shop.relax(&around, &seating)?;
-            }
+        let mut all = Packing {
+            domain: super::world::workshop::open_space(),
+            grains: Vec::new(),
+            contacts: Vec::new(),
+        };
+        for k in 0..self.samples {
+            shop.seed = self.seed + k as u64;
+            self.prepare_one(shop, origin)?;
+            shop.place(UnitQuaternion::identity(), self.foot(k))?;
+            let before = all.grains.len() as u32;
+            let pairs = shop.packing.contacts.drain(..);
+            all.contacts
+                .extend(pairs.map(|pair| pair.map(|i| i + before)));
+            all.grains.append(&mut shop.packing.grains);
         }
-        let middle = Region::All(vec![
-            Region::Cylinder {
-                point: Vector3::zeros(),
-                axis: Vector3::z(),
-                radius: 0.7 * self.radius(),
-            },
-            Region::Block {
-                lower: Vector3::new(
-                    f64::NEG_INFINITY,
-                    f64::NEG_INFINITY,
-                    0.2 * self.sample.height,
-                ),
-                upper: Vector3::new(f64::INFINITY, f64::INFINITY, 0.8 * self.sample.height),
-            },
-        ]);
-        let acceleration = relaxation.acceleration;
-        shop.measure(&around, &middle, acceleration).map(drop)
+        shop.packing = all;
+        Ok(())
     }
 
     fn world(
@@ -314,9 +148,10 @@ impl Recipe for TensileScene {
         materials: &Materials,
         origin: &str,
     ) -> Result<World, Failure> {
-        let mut world = World::empty(self.pull.limit / self.pull.rate);
+        let mut world = World::empty(self.longest());
         if self.clamp.kind == ClampKind::Wall {
-            world.walls.push(("clamp".into(), self.wall()));
+            let named = |k: usize| (format!("clamp_{}", k + 1), self.wall(k));
+            world.walls.extend((0..self.samples).map(named));
         }
         if self.material.sintered {
             let at = Place {
@@ -334,12 +169,11 @@ impl Recipe for TensileScene {
     fn expected(&self, materials: &Materials) -> Expected {
         let head =
             0.5 * PI * self.clamp.height * (self.top_radius().powi(2) - self.radius().powi(2));
-        let ball = self.ball();
         let sample = self.area() * self.sample.height + head;
         Expected {
-            grains: ball.grains_in(sample, materials),
+            grains: self.samples as f64 * self.comet().grains_in(sample, materials),
             preparation: None,
-            duration: self.pull.limit / self.pull.rate,
+            duration: self.longest(),
         }
     }
 
@@ -353,7 +187,7 @@ impl Recipe for TensileScene {
             (
                 "sample".into(),
                 format!(
-                    "porosity {:.1} % from a bulk density of {} kg/m³; cut out of a ball of the material",
+                    "porosity {:.1} % from a bulk density of {} kg/m³; cut out of a block of the material",
                     100.0 * (1.0 - solid),
                     self.material.bulk_density
                 ),
@@ -368,9 +202,11 @@ impl Recipe for TensileScene {
             (
                 "pull".into(),
                 format!(
-                    "on the lowest layer, by {} of Rumpf's strength every {:.3e} s, until the clamp feels less than {BROKEN} of its largest force",
+                    "on the lowest layer, by {} of Rumpf's strength every {:.3e} s, later where the clamp feels it by more than {LAG} too little \
+                     (at most {} times that), until the clamp feels less than {BROKEN} of its largest force",
                     self.pull.step,
-                    self.interval()
+                    self.interval(),
+                    self.pull.patience
                 ),
             ),
         ]
@@ -381,52 +217,22 @@ impl Recipe for TensileScene {
     }
 
     fn steer(&self, simulation: &mut Simulation, state: &mut Vec<f64>) -> Result<Course, Failure> {
-        let origin = "pull";
-        let materials = TensileScene::materials(self, origin)?;
-        if state.is_empty() {
-            let layer = LAYER * comet_ball::diameter(&materials);
-            let pulled = pulled(simulation, layer);
-            if pulled.is_empty() {
-                return Err(Failure::Run(
-                    "no grains are left in the layer that is pulled".into(),
-                ));
-            }
-            state.resize(HEAD, 0.0);
-            state.extend(pulled.into_iter().map(f64::from));
-        }
-        let mut memory = Memory::read(state);
-        let (time, taken) = (simulation.time(), -simulation.wall_impulse().z);
-        if time > memory.time {
-            memory.stress = (taken - memory.taken) / (time - memory.time) / self.area();
-            if memory.stress > memory.strength {
-                (memory.strength, memory.applied_then) = (memory.stress, memory.applied);
-            }
-        }
-        (memory.taken, memory.time) = (taken, time);
-        let step = self.pull.step * self.rumpf(&materials);
-        // Early waves take the clamp's force up and down.
-        let little = memory.stress < BROKEN * memory.strength && memory.strength > 3.0 * step;
-        memory.low = if little { memory.low + 1.0 } else { 0.0 };
-        memory.write(state);
-        if memory.is_over() {
-            return Ok(Course::Over);
-        }
-        memory.applied += step;
-        memory.write(state);
-        self.pull(simulation, state, memory.applied)?;
-        Ok(Course::On)
+        let materials = TensileScene::materials(self, "pull")?;
+        Ok(match self.pull_on(simulation, state, &materials)? {
+            true => Course::On,
+            false => Course::Over,
+        })
     }
 
     fn columns(&self) -> Vec<(String, &'static str)> {
-        vec![
-            ("applied_stress".into(), "Pa"),
-            ("clamp_stress".into(), "Pa"),
-        ]
+        let both = |k| [format!("applied_stress_{k}"), format!("clamp_stress_{k}")];
+        let names = (1..=self.samples).flat_map(both);
+        names.map(|name| (name, "Pa")).collect()
     }
 
     fn look(&self, _: &mut Simulation, _: &Snapshot, state: &[f64]) -> Vec<f64> {
-        let memory = Memory::read(state);
-        vec![memory.applied, memory.stress]
+        let pulls = pull::read(state);
+        pulls.iter().flat_map(|p| [p.applied, p.stress]).collect()
     }
 
     fn groups(&self, simulation: &mut Simulation, _: &[f64]) -> Option<Vec<Option<usize>>> {
@@ -437,26 +243,49 @@ impl Recipe for TensileScene {
 
     fn conclude(&self, ran: &mut Ran, summary: &mut Summary) -> Result<Vec<Table>, Failure> {
         let materials = TensileScene::materials(self, "")?;
-        let memory = Memory::read(&ran.state);
-        let strength = Quantity::new(memory.strength, "Pa");
+        let pulls = pull::read(&ran.state);
+        let of = |f: &dyn Fn(&pull::Pull) -> f64| -> Vec<f64> { pulls.iter().map(f).collect() };
+        let strengths = of(&|p| p.strength);
+        let (strength, error) = mean(&strengths);
+        let quantity = Quantity::new(strength, "Pa").with_error(error);
         summary.put(
             "strength",
             match self.reference() {
-                Some(reference) => strength.against(
+                Some(reference) => quantity.against(
                     reference,
                     "largest mean stress on the clamp; Kappel et al. 2020, §4.3, scaled by 1/R",
                 ),
-                None => strength.from("largest mean stress on the clamp"),
+                None => quantity.from("largest mean stress on the clamp"),
             },
         );
+        let carried = of(&|p| p.carried);
+        let (mean_carried, error) = mean(&carried);
         summary.put(
-            "applied_stress_at_failure",
-            Quantity::new(memory.applied_then, "Pa").from("pull over the cross-section"),
+            "carried_stress",
+            Quantity::new(mean_carried, "Pa")
+                .with_error(error)
+                .from("largest pull that came to stand against the clamp"),
         );
         summary.put(
             "strength_over_rumpf",
-            Quantity::new(memory.strength / self.rumpf(&materials), "1")
+            Quantity::new(strength / self.rumpf(&materials), "1")
                 .from("Rumpf 1962: 1.1 φ/(1-φ) F/d²"),
+        );
+        let samples = self.packings(&ran.packing);
+        let (solid, error) = mean(&samples.iter().map(|s| s.solid_fraction).collect::<Vec<_>>());
+        summary.put(
+            "solid_fraction",
+            Quantity::new(solid, "1").with_error(error).against(
+                self.material.solid_fraction(),
+                "in the samples' middle; bulk density over that of the grains",
+            ),
+        );
+        let (touches, error) = mean(&samples.iter().map(|s| s.coordination).collect::<Vec<_>>());
+        summary.put(
+            "contacts_per_grain",
+            Quantity::new(touches, "1")
+                .with_error(error)
+                .from("before the pull, grains of the surface included"),
         );
         let held = ran.packing.grains.iter().filter(|g| g.fixed).count();
         let share = held as f64 / ran.packing.grains.len() as f64;
@@ -464,21 +293,46 @@ impl Recipe for TensileScene {
             "held_share",
             Quantity::new(share, "1").from("parcels in the clamp's grip"),
         );
-        if !memory.is_over() {
+        let whole = pulls.iter().filter(|p| !p.is_over()).count();
+        if whole > 0 {
             summary.remarks.push(format!(
-                "The sample did not break below {:.3} Pa: the strength is a lower bound.",
-                memory.applied
+                "{whole} of {} samples did not break: the strength is a lower bound.",
+                self.samples
             ));
         }
+        let curves: Vec<[String; 2]> = (1..=self.samples)
+            .map(|k| [format!("clamp_stress_{k}"), format!("sample {k}")])
+            .collect();
+        let curves: Vec<(&str, &str)> = curves.iter().map(|[a, b]| (&**a, &**b)).collect();
         summary.figures.push(Figure::history(
-            "stress [Pa]",
-            &[
-                ("clamp_stress", "on the clamp"),
-                ("applied_stress", "applied"),
-            ],
-            "Pull on the sample's bottom, and what reaches the clamp, over the cross-section.",
+            "stress on the clamp [Pa]",
+            &curves,
+            "What of the pull on a sample's bottom reaches its clamp, over the cross-section.",
         ));
-        Ok(Vec::new())
+        let seeds = (0..self.samples).map(|k| (self.seed + k as u64) as f64);
+        Ok(vec![
+            Table::new("samples")
+                .with("seed", "1", seeds.collect())
+                .with("strength", "Pa", strengths)
+                .with("carried", "Pa", carried)
+                .with("applied_at_strength", "Pa", of(&|p| p.applied_then))
+                .with("broken", "1", of(&|p| f64::from(u8::from(p.is_over()))))
+                .with(
+                    "parcels",
+                    "1",
+                    samples.iter().map(|s| s.grains as f64).collect(),
+                )
+                .with(
+                    "solid_fraction",
+                    "1",
+                    samples.iter().map(|s| s.solid_fraction).collect(),
+                )
+                .with(
+                    "contacts_per_grain",
+                    "1",
+                    samples.iter().map(|s| s.coordination).collect(),
+                ),
+        ])
     }
 
     fn compared(&self) -> Vec<&'static str> {
@@ -486,35 +340,80 @@ impl Recipe for TensileScene {
     }
 }
 
-impl TensileScene {
-    /// Shares a stress (Pa) out over the pulled grains by mass.
-    fn pull(&self, simulation: &mut Simulation, state: &[f64], stress: f64) -> Result<(), Failure> {
-        let pulled = &state[HEAD..];
-        let grains = simulation.grain_list();
-        let mass = |id: &f64| grains[*id as usize].mass();
-        let whole: f64 = pulled.iter().map(mass).sum();
-        let force = -stress * self.area() / whole;
-        let load = |id: &f64| Load {
-            grain: *id as u32,
-            force: Vector3::new(0.0, 0.0, force * mass(id)),
-            moment: Vector3::zeros(),
-        };
-        let loads: Vec<Load> = pulled.iter().map(load).collect();
-        simulation
-            .set_loads(&loads)
-            .map_err(|error| Failure::Run(error.to_string()))
-    }
+/// A sample before it is pulled.
+#[derive(Clone, Copy, Debug, PartialEq)]
+struct Prepared {
+    grains: usize,
+    solid_fraction: f64,
+    coordination: f64,
 }
 
-/// Numbers of the free grains of the lowest layer of this thickness (m).
-fn pulled(simulation: &mut Simulation, thickness: f64) -> Vec<u32> {
-    let grains = simulation.grain_list();
-    let lowest = grains
-        .iter()
-        .map(|g| g.position.z)
-        .fold(f64::INFINITY, f64::min);
-    let within =
-        |(_, g): &(u32, &colluvium_dem::Grain)| !g.fixed && g.position.z <= lowest + thickness;
-    let numbered = (0..).zip(&grains);
-    numbered.filter(within).map(|(id, _)| id).collect()
+/// Mean and its standard error.
+fn mean(values: &[f64]) -> (f64, f64) {
+    let n = values.len() as f64;
+    let mean = values.iter().sum::<f64>() / n;
+    let spread = values.iter().map(|v| (v - mean).powi(2)).sum::<f64>();
+    (mean, (spread / (n - 1.0) / n).sqrt())
+}
+
+impl TensileScene {
+    /// One sample with its foot at the origin.
+    fn prepare_one(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure> {
+        self.block().make(shop, origin)?;
+        let up = Vector3::new(0.0, 0.0, 0.5 * self.sample.height);
+        shop.place(UnitQuaternion::identity(), up)?;
+        let relaxation = comet::relaxation(shop.materials);
+        shop.trim(&self.shape(), false)?;
+        let mut around = self.comet().last(origin)?;
+        match self.clamp.kind {
+            ClampKind::Gripped => {
+                shop.glue(&self.gripped(shop.materials))?;
+                shop.relax(&around, &relaxation)?;
+            }
+            ClampKind::Wall => {
+                around.walls = vec![self.wall(0)];
+                shop.relax(&around, &relaxation)?;
+                let weight = SEATING * self.rumpf(shop.materials);
+                let g = weight / (self.material.bulk_density * self.sample.height);
+                around.gravity = Vector3::new(0.0, 0.0, -g);
+                let seating = Relaxation {
+                    damping: SEATING_DAMPING,
+                    rest: Rest {
+                        kinetic: 1e-8,
+                        unbalanced: 1e9,
+                    },
+                    ..Relaxation::under(g)
+                };
+                shop.relax(&around, &seating)?;
+            }
+        }
+        let acceleration = relaxation.acceleration;
+        shop.measure(&around, &self.middle(), acceleration)
+            .map(drop)
+    }
+
+    /// The samples of a packing.
+    fn packings(&self, packing: &Packing) -> Vec<Prepared> {
+        let of = |k: usize| {
+            let own = |grain: &&Grain| self.sample_at(&grain.position) == k;
+            let foot = self.foot(k);
+            let grains: Vec<Grain> = packing.grains.iter().filter(own).copied().collect();
+            let at_origin: Vec<Grain> = grains
+                .iter()
+                .map(|g| Grain {
+                    position: g.position - foot,
+                    ..*g
+                })
+                .collect();
+            let inside =
+                |pair: &&[u32; 2]| self.sample_at(&packing.grains[pair[0] as usize].position) == k;
+            let contacts = packing.contacts.iter().filter(inside).count();
+            Prepared {
+                grains: grains.len(),
+                solid_fraction: solid_fraction(&at_origin, &packing.domain, &self.middle()),
+                coordination: 2.0 * contacts as f64 / grains.len().max(1) as f64,
+            }
+        };
+        (0..self.samples).map(of).collect()
+    }
 }

@@ -1,6 +1,6 @@
 //! Keys of the boulder drop.
 
-use super::comet::{CometKeys, CometPreparationKeys};
+use super::comet::{CometBlockKeys, CometKeys};
 use super::world::{BondKeys, Materials, OutputKeys, StepKeys, SurfaceKeys};
 use super::{LawKeys, SceneError};
 use schemars::JsonSchema;
@@ -27,7 +27,7 @@ pub struct BoulderScene {
     /// What it is made of.
     pub material: CometKeys,
     /// How it is made.
-    pub preparation: CometPreparationKeys,
+    pub preparation: CometBlockKeys,
     /// How it hits the ground.
     pub impact: BoulderImpactKeys,
     /// What the ground is like.
@@ -91,7 +91,9 @@ impl BoulderScene {
 
     pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {
         self.material.check_together(origin)?;
-        self.preparation.check_together(&self.contact, origin)?;
+        self.preparation
+            .softness()
+            .check_together(&self.contact, origin)?;
         self.materials(origin)?;
         let widest = self.coarse_graining * self.material.largest_diameter;
         if 4.0 * widest > self.diameter {

@@ -82,31 +82,59 @@ pub struct CometKeys {
     pub bulk_density: f64,
 }
 
-/// How a ball of the material is made.
+/// How a block of the material is made.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
-pub struct CometPreparationKeys {
-    /// E while grains are pulled together (Pa): soft grains allow long steps; then it is raised in steps.
+pub struct CometBlockKeys {
+    /// E while grains are pressed together (Pa): soft grains allow long steps; then it is raised in steps.
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e13))]
     pub youngs_modulus: f64,
-    /// Restitution while the ball is made.
+    /// Restitution while the block is made.
     #[schemars(extend("minimum" = 0.01, "maximum" = 1.0))]
     pub restitution: f64,
-    /// Radius of the ball over what is needed: its rim is loose.
-    #[schemars(extend("minimum" = 1.0, "maximum" = 2.0))]
-    pub margin: f64,
-    /// First pull to the centre, by the pressure that it lays on the middle of the ball over Rumpf's
-    /// strength; it grows until the porosity is reached.
+    /// Friction and rolling friction while the block is made: the less, the more contacts it ends with.
+    #[schemars(extend("minimum" = 0.0, "maximum" = 10.0))]
+    pub friction: f64,
+    /// Speed at which neighbours close in at the end (m/s).
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0))]
-    pub pull: f64,
+    pub speed: f64,
+    /// Material around what is cut out of the block, in mean diameters of parcels.
+    #[schemars(extend("minimum" = 0.0, "maximum" = 100.0))]
+    pub margin: f64,
 }
 
-impl CometPreparationKeys {
-    /// The law in which the ball is made, at this E (Pa).
+impl CometBlockKeys {
+    /// What grains are like meanwhile.
+    pub fn softness(&self) -> Softness {
+        Softness {
+            youngs_modulus: self.youngs_modulus,
+            restitution: self.restitution,
+            friction: Some(self.friction),
+        }
+    }
+}
+
+/// What grains are like while they are put in place.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Softness {
+    /// E (Pa), below that of the scene's law.
+    pub youngs_modulus: f64,
+    /// Restitution.
+    pub restitution: f64,
+    /// Friction and rolling friction, where they are not those of the scene's law.
+    pub friction: Option<f64>,
+}
+
+impl Softness {
+    /// The law in which grains are put in place, at this E (Pa).
     pub fn contact(&self, contact: &LawKeys, youngs_modulus: f64) -> LawKeys {
         LawKeys {
             youngs_modulus: Some(youngs_modulus),
             restitution: Some(self.restitution),
+            friction: contact.friction.map(|own| self.friction.unwrap_or(own)),
+            rolling_friction: contact
+                .rolling_friction
+                .map(|own| self.friction.unwrap_or(own)),
             ..*contact
         }
     }

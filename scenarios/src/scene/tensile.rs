@@ -1,6 +1,6 @@
 //! Keys of the tensile test.
 
-use super::comet::{CometKeys, CometPreparationKeys};
+use super::comet::{CometBlockKeys, CometKeys};
 use super::world::{BondKeys, Materials, OutputKeys, StepKeys};
 use super::{LawKeys, SceneError};
 use schemars::JsonSchema;
@@ -11,9 +11,12 @@ use std::collections::BTreeMap;
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct TensileScene {
-    /// Seed of all random numbers.
-    #[schemars(extend("minimum" = 0, "maximum" = 9007199254740991_i64))]
+    /// Seed of the first sample; each further one has the next.
+    #[schemars(extend("minimum" = 0, "maximum" = 9007199254740000_i64))]
     pub seed: u64,
+    /// Samples, each with a seed of its own: the result is their mean with its standard error.
+    #[schemars(extend("minimum" = 1, "maximum" = 100))]
+    pub samples: usize,
     /// Size of the computed parcels over that of the grains.
     #[schemars(extend("minimum" = 1.0, "maximum" = 1.0e6))]
     pub coarse_graining: f64,
@@ -26,7 +29,7 @@ pub struct TensileScene {
     /// Its shape.
     pub sample: SampleKeys,
     /// How it is made.
-    pub preparation: CometPreparationKeys,
+    pub preparation: CometBlockKeys,
     /// What holds it.
     pub clamp: ClampKeys,
     /// How it is pulled.
@@ -89,6 +92,9 @@ pub struct PullKeys {
     /// Step of the stress over the same estimate.
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 0.5))]
     pub step: f64,
+    /// Steps' times that the pull waits at most until the clamp feels what is pulled; 1: it never waits.
+    #[schemars(extend("minimum" = 1.0, "maximum" = 1.0e3))]
+    pub patience: f64,
     /// Stress at which the test is given up, over the same estimate.
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e3))]
     pub limit: f64,
@@ -107,7 +113,9 @@ impl TensileScene {
 
     pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {
         self.material.check_together(origin)?;
-        self.preparation.check_together(&self.contact, origin)?;
+        self.preparation
+            .softness()
+            .check_together(&self.contact, origin)?;
         self.materials(origin)?;
         let refuse = |key: &str, value: f64, range: String| {
             Err(SceneError::OutOfRange {

@@ -167,7 +167,8 @@ pub fn run(recipe: &dyn Recipe, under: &mut Under) -> Result<Findings, Failure> 
         under.begin()?;
     }
     let clock = Instant::now();
-    let pictures = Pictures::new(recipe, &materials, under.directory);
+    let bodies = stand.world.bodies.clone();
+    let pictures = Pictures::new(recipe, &materials, &bodies, under.directory);
     follow(
         Followed {
             recipe,

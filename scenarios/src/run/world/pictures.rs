@@ -1,17 +1,17 @@
-//! Pictures of the grains in the run directory, `view_*.png`: balls in a parallel projection.
+//! Pictures of grains and bodies in the run directory, `view_*.png`: balls and triangles in a parallel
+//! projection.
+
+mod canvas;
+mod facets;
 
 use super::recipe::Recipe;
 use crate::failure::Failure;
 use crate::run_directory::RunDirectory;
 use crate::scene::world::Materials;
 use crate::summary::Figure;
-use colluvium_dem::{Shape, Simulation};
+use canvas::{Ball, Plate};
+use colluvium_dem::{Body, Shape, Simulation};
 use nalgebra::Vector3;
-
-/// Pixels along the longer edge.
-const SIZE: f64 = 720.0;
-/// Margin around the grains, over the longer edge.
-const MARGIN: f64 = 0.04;
 
 /// Colours of kinds and clusters, apart for the colour-blind (after Okabe & Ito).
 const PALETTE: [[u8; 3]; 8] = [
@@ -26,9 +26,8 @@ const PALETTE: [[u8; 3]; 8] = [
 ];
 /// Colour of grains without a cluster, and of fixed ones.
 const PLAIN: [u8; 3] = [0xb4, 0xb4, 0xb4];
-/// What lies behind, and within a plane that is seen from its side.
-const PAPER: [u8; 3] = [0xff, 0xff, 0xff];
-const GROUND: [u8; 3] = [0xe4, 0xdf, 0xd4];
+/// Colour of bodies.
+const BODY: [u8; 3] = [0xe8, 0xe6, 0xe0];
 /// Colours of rising speed (after viridis).
 const SPEEDS: [[f64; 3]; 5] = [
     [68.0, 1.0, 84.0],
@@ -62,15 +61,8 @@ pub struct Pictures<'a> {
     view: [Vector3<f64>; 2],
     kinds: &'a [String],
     between: u64,
+    bodies: &'a [(String, Body)],
     directory: &'a RunDirectory,
-}
-
-/// A ball to be drawn: place in the picture (m), depth (m), radius (m), colour.
-struct Ball {
-    at: [f64; 2],
-    depth: f64,
-    radius: f64,
-    colour: [u8; 3],
 }
 
 impl<'a> Pictures<'a> {
@@ -78,12 +70,14 @@ impl<'a> Pictures<'a> {
     pub fn new(
         recipe: &dyn Recipe,
         materials: &'a Materials,
+        bodies: &'a [(String, Body)],
         directory: &'a RunDirectory,
     ) -> Pictures<'a> {
         Pictures {
             view: recipe.view(),
             kinds: &materials.names,
             between: recipe.output().pictures,
+            bodies,
             directory,
         }
     }
@@ -139,7 +133,7 @@ impl<'a> Pictures<'a> {
         let [away, up] = self.view;
         let right = away.cross(&up);
         let grains = simulation.grain_list();
-        if grains.is_empty() {
+        if grains.is_empty() && self.bodies.is_empty() {
             return Ok(());
         }
         let fastest = fastest(
@@ -170,7 +164,8 @@ impl<'a> Pictures<'a> {
             })
             .collect();
         let grounds = self.grounds(simulation, [right, up]);
-        let (pixels, size) = paint(&balls, &grounds);
+        let plates = self.plates(simulation, [right, up, away]);
+        let (pixels, size) = canvas::paint(&balls, &plates, &grounds);
         let text = match colouring {
             Colouring::Kinds => self
                 .kinds
@@ -191,6 +186,19 @@ impl<'a> Pictures<'a> {
         let bytes = encode(&pixels, size, &caption)
             .map_err(|error| Failure::Run(format!("cannot make the picture {name}: {error}")))?;
         self.directory.write(&name, &bytes)
+    }
+
+    /// Surfaces of the bodies, in the picture's axes.
+    fn plates(&self, simulation: &mut Simulation, axes: [Vector3<f64>; 3]) -> Vec<Plate> {
+        let plate = |facet: facets::Facet| Plate {
+            corners: facet.map(|v| axes.map(|axis| v.dot(&axis))),
+            colour: BODY,
+        };
+        let bodies = self.bodies.iter().enumerate();
+        bodies
+            .flat_map(|(k, (_, body))| facets::of(body, &simulation.body(k).pose))
+            .map(plate)
+            .collect()
     }
 
     /// Planes that are seen from their sides: a point and the normal, in the picture (m).
@@ -256,84 +264,6 @@ fn speed_colour(share: f64) -> [u8; 3] {
     std::array::from_fn(|c| (SPEEDS[low][c] + part * (SPEEDS[low + 1][c] - SPEEDS[low][c])) as u8)
 }
 
-/// Pixels as rows of RGB from the top, and their numbers along both edges.
-fn paint(balls: &[Ball], grounds: &[[[f64; 2]; 2]]) -> (Vec<u8>, [usize; 2]) {
-    let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-    for ball in balls {
-        for k in 0..2 {
-            low[k] = low[k].min(ball.at[k] - ball.radius);
-            high[k] = high[k].max(ball.at[k] + ball.radius);
-        }
-    }
-    let longer = (high[0] - low[0]).max(high[1] - low[1]);
-    let margin = MARGIN * longer;
-    let scale = SIZE / (longer + 2.0 * margin);
-    let size: [usize; 2] = std::array::from_fn(|k| {
-        ((high[k] - low[k] + 2.0 * margin) * scale).ceil().max(1.0) as usize
-    });
-    let place = |column: usize, row: usize| {
-        [
-            low[0] - margin + (column as f64 + 0.5) / scale,
-            high[1] + margin - (row as f64 + 0.5) / scale,
-        ]
-    };
-    let mut pixels = Vec::with_capacity(3 * size[0] * size[1]);
-    for row in 0..size[1] {
-        for column in 0..size[0] {
-            let x = place(column, row);
-            let below = |[p, n]: &[[f64; 2]; 2]| (x[0] - p[0]) * n[0] + (x[1] - p[1]) * n[1] < 0.0;
-            pixels.extend(if grounds.iter().any(below) {
-                GROUND
-            } else {
-                PAPER
-            });
-        }
-    }
-    let mut nearest = vec![f64::INFINITY; size[0] * size[1]];
-    for ball in balls {
-        let column = |x: f64| (x - low[0] + margin) * scale - 0.5;
-        let row = |y: f64| (high[1] + margin - y) * scale - 0.5;
-        let within = |from: f64, to: f64, count: usize| {
-            let first = from.floor().max(0.0) as usize;
-            first..(to.ceil() as usize + 1).min(count)
-        };
-        let rows = within(
-            row(ball.at[1] + ball.radius),
-            row(ball.at[1] - ball.radius),
-            size[1],
-        );
-        for r in rows {
-            let columns = within(
-                column(ball.at[0] - ball.radius),
-                column(ball.at[0] + ball.radius),
-                size[0],
-            );
-            for c in columns {
-                let x = place(c, r);
-                let off = [
-                    (x[0] - ball.at[0]) / ball.radius,
-                    (x[1] - ball.at[1]) / ball.radius,
-                ];
-                let rest = 1.0 - off[0] * off[0] - off[1] * off[1];
-                let front = rest.max(0.0).sqrt();
-                let depth = ball.depth - ball.radius * front;
-                let k = r * size[0] + c;
-                if rest < 0.0 || depth >= nearest[k] {
-                    continue;
-                }
-                nearest[k] = depth;
-                // Light from the upper left, towards the picture.
-                let light =
-                    (0.45 + 0.55 * (0.4 * off[1] - 0.3 * off[0] + 0.87 * front)).clamp(0.2, 1.0);
-                for (channel, colour) in ball.colour.into_iter().enumerate() {
-                    pixels[3 * k + channel] = (f64::from(colour) * light) as u8;
-                }
-            }
-        }
-    }
-    (pixels, size)
-}
-
 /// Keyword of the caption in a file.
 const CAPTION: &str = "Description";
 
@@ -367,29 +297,8 @@ mod tests {
     use super::*;
 
     #[test]
-    fn the_nearer_ball_hides_the_farther_and_captions_stay() {
-        let ball = |depth: f64, colour: [u8; 3], x: f64| Ball {
-            at: [x, 0.0],
-            depth,
-            radius: 1.0,
-            colour,
-        };
-        let (red, blue) = ([200, 0, 0], [0, 0, 200]);
-        let ground = [[[0.0, 0.0], [0.0, 1.0]]];
-        for order in [[0, 1], [1, 0]] {
-            let balls = [ball(0.0, red, 0.0), ball(5.0, blue, 0.0)];
-            let mut balls = Vec::from(balls);
-            if order[0] == 1 {
-                balls.swap(0, 1);
-            }
-            let (pixels, [w, h]) = paint(&balls, &ground);
-            let middle = 3 * (h / 2 * w + w / 2);
-            assert!(pixels[middle] > 100 && pixels[middle + 2] == 0);
-            // Corners: paper above the plane, ground below it.
-            assert_eq!(pixels[..3], PAPER);
-            assert_eq!(pixels[pixels.len() - 3..], GROUND);
-            let bytes = encode(&pixels, [w, h], "t = 1 s").unwrap();
-            assert_eq!(caption(&bytes).unwrap(), "t = 1 s");
-        }
+    fn captions_stay_with_their_pictures() {
+        let bytes = encode(&[0; 12], [2, 2], "t = 1 s").unwrap();
+        assert_eq!(caption(&bytes).unwrap(), "t = 1 s");
     }
 }
