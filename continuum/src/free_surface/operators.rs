@@ -13,6 +13,7 @@ use super::plane::Plane;
 use super::topology::{NONE, Topology};
 use crate::discretisation::{Discretisation, Parts, QuadraturePoint, VelocityAt, add_corner_shear};
 use crate::grid::{Axis, DIMENSIONS, Grid};
+use crate::linear_solver::Place;
 
 /// Smallest θ in the pressure gradient and in the pressure at walls.
 const NEAREST_SURFACE: f64 = 0.005;
@@ -48,6 +49,7 @@ impl Material<'_> {
             components: self.faces.own.iter().map(|&(c, _)| c).collect(),
             boundary_load: vec![0.0; self.faces.own.len()],
             cells: self.faces.active.len(),
+            places: self.places(),
             ..Parts::default()
         };
         self.add_pressure_forces(&mut parts);
@@ -62,6 +64,22 @@ impl Material<'_> {
             discretisation: Discretisation::of_parts(self.grid.clone(), parts),
             places,
         }
+    }
+
+    /// Where the unknowns are, in half cells.
+    fn places(&self) -> Vec<Place> {
+        let velocities = self.faces.own.iter().map(|&(component, face)| {
+            let width = self.grid.faces(component)[0];
+            let mut place = [2 * (face % width) as u32, 2 * (face / width) as u32];
+            place[1 - component] += 1;
+            place
+        });
+        let width = self.grid.axes()[0].cells();
+        let cells = self.faces.active.iter();
+        let cells = cells.map(|cell| [(cell % width) as u32, (cell / width) as u32]);
+        velocities
+            .chain(cells.map(|index| index.map(|i| 2 * i + 1)))
+            .collect()
     }
 
     /// Mass of each unknown, followers included.
