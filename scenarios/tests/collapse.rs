@@ -90,7 +90,7 @@ fn bad_collapses_are_refused_by_key() {
         ("model=\"gas\"", "model", "continuum"),
         ("grid.length_scaled=1.5", "grid.length_scaled", "2"),
         ("grid.cells=8", "grid.cells", "at least"),
-        ("solver.courant=0.7", "solver.courant", "0.5"),
+        ("solver.courant=1.5", "solver.courant", "1"),
         ("rheology.mu_2=0.1", "rheology.mu_2", "0.32"),
         ("aspect=0", "aspect", "0.05"),
     ] {

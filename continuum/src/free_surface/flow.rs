@@ -25,7 +25,7 @@ use crate::yield_step::{
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SurfaceOptions {
-    /// Largest Δt Σ |u|/h over the axes, at most ½.
+    /// Largest Δt Σ |u|/h over the axes, at most 1. Above ½ material moves in two parts with one velocity.
     pub courant: f64,
     /// Largest time step.
     pub largest_step: f64,
@@ -49,6 +49,7 @@ impl Default for SurfaceOptions {
                 momentum_tolerance: 1e-5,
                 divergence_tolerance: 1e-8,
                 stress_tolerance: 1e-4,
+                tolerance_in_motion: 50.0,
                 one_sided_pressure: true,
                 ..PrimalDualOptions::default()
             },
@@ -63,10 +64,10 @@ impl SurfaceOptions {
     /// [`Error::OutOfRange`] with the key, the value and the allowed range.
     pub fn validate(&self) -> Result<(), Error> {
         require(
-            self.courant > 0.0 && self.courant <= 0.5,
+            self.courant > 0.0 && self.courant <= 1.0,
             "solver.courant",
             self.courant,
-            "greater than 0, at most 0.5: beyond, a fraction may leave [0, 1]",
+            "greater than 0, at most 1: no velocity is known farther than a cell from the material",
         )?;
         require(
             self.largest_step > 0.0,
@@ -102,6 +103,8 @@ pub struct SurfaceStep {
     pub max_speed: f64,
 }
 
+/// Largest Courant number of a part of a step: beyond, a fraction may leave [0, 1].
+const LONGEST_PASS: f64 = 0.5;
 /// Least time by which the velocity moves on, over the time step.
 const LEAST_PUSH: f64 = 0.5;
 /// Free fall may shrink a cell at this rate: the round-off of a velocity over a cell.
@@ -414,10 +417,12 @@ impl<R: Rheology> SurfaceFlow<R> {
                 self.state.fractions[cell] > ACTIVE && self.divergence(cell).abs() < DILATES
             })
             .collect();
+        let passes = (dt * self.largest_rate() / LONGEST_PASS).ceil().max(1.0);
         self.transport.advance(
             &Motion {
                 topology: &self.topology,
-                courant: std::array::from_fn(|axis| dt / axes[axis].spacing()),
+                passes: passes as usize,
+                courant: std::array::from_fn(|axis| dt / (passes * axes[axis].spacing())),
                 order: &order,
                 incompressible: &incompressible,
             },

@@ -3,7 +3,8 @@
 //! Volume moves through the faces of cells as the reconstructed planes say, one axis after the
 //! other. A cell that is more than half full and without divergence keeps its dilatation c ∂u/∂x in
 //! each sweep, with c fixed for the step, which leaves every fraction in [0, 1] while
-//! Δt Σ |u|/h ≤ ½ (Weymouth & Yue, *J. Comput. Phys.* 229 (2010) 2853).
+//! Δt Σ |u|/h ≤ ½ (Weymouth & Yue, *J. Comput. Phys.* 229 (2010) 2853). A longer step is moved in parts of
+//! that size with one and the same velocity.
 //!
 //! The mass of a velocity is the mean over the two cells of its face, so the volume fluxes of cells
 //! average to the fluxes between velocities, and momentum moves with exactly the mass that moves: a
@@ -37,7 +38,9 @@ pub(crate) struct Transport {
 /// What moves, and how fast.
 pub(crate) struct Motion<'a> {
     pub topology: &'a Topology,
-    /// Δt over the cell size along each axis.
+    /// Parts of the step, each of which moves material with the same velocity.
+    pub passes: usize,
+    /// Δt of a part over the cell size along each axis.
     pub courant: [f64; DIMENSIONS],
     /// Axes to sweep over, in this order.
     pub order: &'a [usize],
@@ -54,6 +57,12 @@ impl Transport {
         velocity: &mut Velocity,
     ) {
         self.start.clone_from(velocity);
+        for _ in 0..motion.passes {
+            self.pass(motion, fractions, velocity);
+        }
+    }
+
+    fn pass(&mut self, motion: &Motion<'_>, fractions: &mut Vec<f64>, velocity: &mut Velocity) {
         self.total_dilatation.clear();
         self.total_dilatation.resize(fractions.len(), 0.0);
         for (nth, &axis) in motion.order.iter().enumerate() {

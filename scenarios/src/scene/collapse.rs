@@ -61,7 +61,7 @@ pub struct CollapseGrid {
 #[serde(deny_unknown_fields)]
 pub struct CollapseSolver {
     /// Largest Δt Σ|u|/h over the axes.
-    #[schemars(extend("minimum" = 0.001, "maximum" = 0.5))]
+    #[schemars(extend("minimum" = 0.001, "maximum" = 1.0))]
     pub courant: f64,
     /// Largest time step over √(height/gravity).
     #[schemars(extend("minimum" = 1.0e-6, "maximum" = 10.0))]
