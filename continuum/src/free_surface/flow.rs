@@ -17,6 +17,7 @@ use crate::discretisation::{COMPONENTS, Discretisation};
 use crate::error::{Error, require};
 use crate::grid::{Axis, DIMENSIONS, Grid};
 use crate::rheology::Rheology;
+use crate::wall_friction::SideWalls;
 use crate::yield_step::{
     FlowState, PrimalDual, PrimalDualOptions, Residuals, StepProblem, YieldSolver,
 };
@@ -127,7 +128,7 @@ pub struct SurfaceState {
     pub velocity: [Vec<f64>; DIMENSIONS],
     /// Pressure of each cell, negative where there is none.
     pub pressure: Vec<f64>,
-    /// Stress at each corner of each cell.
+    /// Stress at each corner of each cell, then the traction of side walls there if there are any.
     pub stress: Vec<[f64; COMPONENTS]>,
     /// Time of the fractions.
     pub time: f64,
@@ -150,6 +151,7 @@ pub struct SurfaceFlow<R> {
     saved: SurfaceState,
     planes: Vec<Option<Plane>>,
     transport: Transport,
+    side_walls: Option<SideWalls>,
     solver: Option<(Vec<usize>, PrimalDual)>,
     unknowns: FlowState,
     momentum: Vec<f64>,
@@ -196,6 +198,7 @@ impl<R: Rheology> SurfaceFlow<R> {
             state,
             planes: Vec::new(),
             transport: Transport::default(),
+            side_walls: None,
             solver: None,
             unknowns: FlowState {
                 u: Vec::new(),
@@ -213,6 +216,20 @@ impl<R: Rheology> SurfaceFlow<R> {
         })
     }
 
+    /// The same flow between side walls at a distance along y, in natural units: they rub on what
+    /// moves with 2 c/W + (2 μ/W) p per volume.
+    ///
+    /// # Errors
+    /// Walls out of range.
+    pub fn between_side_walls(mut self, walls: SideWalls) -> Result<Self, Error> {
+        walls.validate()?;
+        self.side_walls = Some(walls);
+        let points = 2 * self.topology.cells() * POINTS;
+        self.state.stress.resize(points, [0.0; COMPONENTS]);
+        self.saved.clone_from(&self.state);
+        Ok(self)
+    }
+
     /// The state.
     pub fn state(&self) -> &SurfaceState {
         &self.state
@@ -226,7 +243,7 @@ impl<R: Rheology> SurfaceFlow<R> {
         let cells = self.topology.cells();
         let fits = state.fractions.len() == cells
             && state.pressure.len() == cells
-            && state.stress.len() == cells * POINTS
+            && state.stress.len() == self.state.stress.len()
             && (0..DIMENSIONS).all(|c| state.velocity[c].len() == self.topology.faces(c));
         if !fits {
             return Err(Error::ForeignState {
@@ -464,6 +481,7 @@ impl<R: Rheology> SurfaceFlow<R> {
             fractions: &self.state.fractions,
             planes: &self.planes,
             faces: &faces,
+            side_walls: self.side_walls,
             acceleration: self.acceleration,
         }
         .operators();
@@ -517,7 +535,10 @@ impl<R: Rheology> SurfaceFlow<R> {
         let unknowns = &mut self.unknowns;
         let is_loose = unknowns.p.iter().all(|p| *p <= f64::MIN_POSITIVE)
             && unknowns.s.iter().all(|s| *s == [0.0; COMPONENTS])
-            && self.rheology.threshold(1.0, 0.0).stress == 0.0;
+            && self.rheology.threshold(1.0, 0.0).stress == 0.0
+            && self
+                .side_walls
+                .is_none_or(|walls| walls.friction.cohesion == 0.0);
         if !is_loose {
             return false;
         }
