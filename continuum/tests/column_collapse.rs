@@ -89,6 +89,24 @@ fn restart_gives_the_same_bits() {
     assert!(resumed.set_state(Default::default()).is_err());
 }
 
+/// A step of Courant number one moves its material in two parts and keeps every fraction in [0, 1].
+#[test]
+fn long_steps_move_material_in_parts() {
+    let case = case(6.26, 96, 1.0 / 134.0);
+    let options = SurfaceOptions {
+        courant: 1.0,
+        ..SurfaceOptions::default()
+    };
+    let mut collapse = Collapse::new(&case, &options).unwrap();
+    while collapse.time() < 4.0 {
+        collapse.step(4.0).unwrap();
+        for f in &collapse.flow().state().fractions {
+            assert!((0.0..=1.0 + 1e-9).contains(f), "{f}");
+        }
+    }
+    assert!(collapse.volume_drift().abs() < 1e-12);
+}
+
 /// Without an intermediate step from rest to any Δt: no blow-up and no cut.
 #[test]
 fn first_step_may_have_any_size() {

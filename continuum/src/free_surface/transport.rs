@@ -10,6 +10,7 @@
 //! average to the fluxes between velocities, and momentum moves with exactly the mass that moves: a
 //! uniform velocity stays uniform to the last bits, and momentum is conserved to round-off.
 
+use super::faces::ACTIVE;
 use super::fraction::{reconstruct, volume_in};
 use super::plane::Plane;
 use super::topology::{NONE, Topology};
@@ -29,6 +30,8 @@ pub(crate) struct Transport {
     fluxes: Vec<f64>,
     dilatation: Vec<f64>,
     total_dilatation: Vec<f64>,
+    /// Cells that keep their dilatation in the sweeps of a part.
+    dilates: Vec<bool>,
     next: Vec<f64>,
     start: Velocity,
     /// Momentum of each velocity of a component.
@@ -65,6 +68,10 @@ impl Transport {
     fn pass(&mut self, motion: &Motion<'_>, fractions: &mut Vec<f64>, velocity: &mut Velocity) {
         self.total_dilatation.clear();
         self.total_dilatation.resize(fractions.len(), 0.0);
+        self.dilates.clear();
+        let full = fractions.iter().zip(motion.incompressible);
+        self.dilates
+            .extend(full.map(|(f, incompressible)| *incompressible && *f > ACTIVE));
         for (nth, &axis) in motion.order.iter().enumerate() {
             reconstruct(motion.topology, fractions, &mut self.planes);
             self.volume_fluxes(motion, fractions, axis);
@@ -117,7 +124,7 @@ impl Transport {
             let [low, high] = topology.cell_faces[cell][axis];
             // The last sweep takes back what the others gave, so that nothing is left to the
             // residual of the divergence.
-            let dilatation = if !motion.incompressible[cell] {
+            let dilatation = if !self.dilates[cell] {
                 0.0
             } else if is_last {
                 -self.total_dilatation[cell]
