@@ -9,7 +9,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, require};
-use crate::free_surface::{SurfaceFlow, SurfaceOptions, SurfaceState, SurfaceStep};
+use crate::free_surface::{CellFields, SurfaceFlow, SurfaceOptions, SurfaceState, SurfaceStep};
 use crate::grid::{Axis, Boundary, Grid};
 use crate::rheology::{MuI, Rheology};
 use crate::units::Units;
@@ -174,6 +174,11 @@ impl Collapse {
         &self.units
     }
 
+    /// The material, in SI units.
+    pub fn rheology(&self) -> &MuI {
+        &self.case.rheology
+    }
+
     /// The flow, in natural units.
     pub fn flow(&self) -> &SurfaceFlow<MuI> {
         &self.flow
@@ -227,6 +232,35 @@ impl Collapse {
             positions.collect(),
             heights.iter().map(|h| h * self.case.height).collect(),
         )
+    }
+
+    /// Fields of the cells with material, x fastest, in SI units.
+    pub fn fields(&self) -> Vec<CellFields> {
+        let (units, length) = (&self.units, self.case.height);
+        let mut fields = self.flow.cell_fields();
+        for f in &mut fields {
+            let scaled = |values: [f64; 2], unit: f64| values.map(|v| v * unit);
+            (f.lower, f.upper) = (scaled(f.lower, length), scaled(f.upper, length));
+            f.velocity = scaled(f.velocity, units.velocity);
+            f.pressure *= units.stress();
+            f.stress = scaled(f.stress, units.stress());
+            f.strain_rate /= units.time();
+        }
+        fields
+    }
+
+    /// Shares of the material's volume: that flows, and that flows where the equations of motion are ill posed.
+    pub fn flowing_shares(&self) -> [f64; 2] {
+        let fields = self.flow.cell_fields();
+        let share = |counts: &dyn Fn(&CellFields) -> bool| {
+            let (mut part, mut whole) = (0.0, 0.0);
+            for f in &fields {
+                whole += f.fraction;
+                part += if counts(f) { f.fraction } else { 0.0 };
+            }
+            if whole > 0.0 { part / whole } else { 0.0 }
+        };
+        [share(&|f| f.flows), share(&|f| !f.well_posed)]
     }
 
     /// Where the heap reaches down to a height (m).

@@ -9,6 +9,7 @@
 //! array; only the corners of quadrature points are written for a plane.
 
 mod faces;
+mod fields;
 mod flow;
 mod fraction;
 mod operators;
@@ -17,4 +18,5 @@ mod topology;
 mod transport;
 
 pub use faces::ThinLayer;
+pub use fields::CellFields;
 pub use flow::{Spent, SurfaceFlow, SurfaceOptions, SurfaceState, SurfaceStep};

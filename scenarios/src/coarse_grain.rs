@@ -8,7 +8,7 @@ use crate::vtkhdf::{self, Cells as FrameCells, Field, Frame, Values};
 use colluvium_coupling::coarse_graining::{
     AveragerError, Cells, Geometry, Mesh, PointFields, PointSums, Shape, solid_fractions,
 };
-use colluvium_dem::{Domain, GrainSample, Snapshot};
+use colluvium_dem::{ContactSample, Domain, GrainSample, Snapshot};
 use nalgebra::{Matrix3, Vector3};
 use std::path::{Path, PathBuf};
 
@@ -62,8 +62,10 @@ pub fn coarse_grain(request: &Request) -> Result<String, Failure> {
     }
     let mut work: Option<Work> = None;
     let mut instants = 0;
+    let mut forces = Forces::default();
     for file in &request.files {
         instants += grain_files::read(file, &request.unsaid, &mut |snapshot| {
+            forces.see(snapshot);
             if work.is_none() {
                 work = Some(Work::begin(request, snapshot)?);
             }
@@ -80,12 +82,41 @@ pub fn coarse_grain(request: &Request) -> Result<String, Failure> {
         .map_err(|e| Failure::Input(format!("cannot make {}: {e}", request.out.display())))?;
     work.write(&request.out)?;
     Ok(format!(
-        "{instants} instants, {} places, kernel {:?} of {} m: {}",
+        "{instants} instants, {} places, kernel {:?} of {} m: {}{}",
         work.sums.places().len(),
         request.shape,
         work.sums.kernel().width(),
-        request.out.display()
+        request.out.display(),
+        forces.doubt()
     ))
+}
+
+/// What the forces of contacts look like.
+#[derive(Default)]
+struct Forces {
+    central: usize,
+    all: usize,
+}
+
+impl Forces {
+    fn see(&mut self, snapshot: &Snapshot) {
+        // Forces from text have some ten digits.
+        let central = |c: &&ContactSample| {
+            let across = c.force.cross(&c.arm).norm();
+            across <= 1e-6 * c.force.norm() * c.arm.norm()
+        };
+        self.all += snapshot.contacts.len();
+        self.central += snapshot.contacts.iter().filter(central).count();
+    }
+
+    fn doubt(&self) -> &'static str {
+        if self.all > 0 && self.central == self.all {
+            "\nwarning: all forces lie along the lines of centres, as without friction; LAMMPS' pair/local gives tangential \
+             forces as p1,p2,p3, to be added by --contact-columns id1,id2,fx+p1,fy+p2,fz+p3 with its own names"
+        } else {
+            ""
+        }
+    }
 }
 
 struct Work {

@@ -150,7 +150,8 @@ struct CoarseGrainArguments {
     /// Local dump of the contacts beside a text dump
     #[arg(long, value_name = "FILE")]
     contacts: Option<PathBuf>,
-    /// Columns of that dump: id1,id2,fx,fy,fz, and tx,ty,tz for torques [default: the first five]
+    /// Columns of that dump: id1,id2,fx,fy,fz, and tx,ty,tz for torques; a+b adds two, as for LAMMPS' pair/local, whose
+    /// fx,fy,fz are the normal force and p1,p2,p3 the tangential one [default: the first five]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     contact_columns: Vec<String>,
     /// Kernel

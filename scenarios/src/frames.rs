@@ -1,4 +1,4 @@
-//! Pictures of a run through time: `grains.vtkhdf`, `contacts.vtkhdf`.
+//! Pictures of a run through time: `grains.vtkhdf`, `contacts.vtkhdf`, `fields.vtkhdf`.
 //!
 //! While a run goes on, every instant lies in a file of its own in the folder `frames`, put in place
 //! whole: a killed run or a full disk leaves all earlier ones, and a run that is resumed writes the same
@@ -13,8 +13,10 @@ use std::path::{Path, PathBuf};
 
 /// Folder of single frames in a run directory.
 pub const FOLDER: &str = "frames";
-/// Series at the end of a run.
+/// Series at the end of a run with grains.
 pub const SERIES: [&str; 2] = ["grains", "contacts"];
+/// Series at the end of a run of a continuum.
+pub const FIELDS: &str = "fields";
 
 /// The frames of a run.
 #[derive(Debug)]
@@ -64,23 +66,11 @@ impl Frames {
         }
         simulation.snapshot(snapshot);
         let clusters = simulation.clusters();
-        let folder = self.directory.join(FOLDER);
-        fs::create_dir_all(&folder).map_err(|error| {
-            Failure::Run(format!(
-                "cannot make the folder {}: {error}",
-                folder.display()
-            ))
-        })?;
         let frames = [grains(snapshot, &clusters), contacts(snapshot)];
         for (series, frame) in SERIES.into_iter().zip(frames) {
-            vtkhdf::write(&self.path(series, step), [Ok(frame)])?;
+            put(&self.directory, series, step, frame)?;
         }
         Ok(())
-    }
-
-    fn path(&self, series: &str, step: u64) -> PathBuf {
-        let name = format!("{series}_{step:012}.vtkhdf");
-        self.directory.join(FOLDER).join(name)
     }
 
     /// Joins all frames up to the last step `done` into one file a series. The single ones stay until the run
@@ -93,12 +83,35 @@ impl Frames {
         steps.dedup();
         steps.retain(|&step| step <= done);
         for series in SERIES {
-            let paths = steps.iter().map(|&step| self.path(series, step));
-            let series = self.directory.join(format!("{series}.vtkhdf"));
-            vtkhdf::write(&series, paths.map(|path| vtkhdf::read_frame(&path)))?;
+            join(&self.directory, series, &steps)?;
         }
         Ok(())
     }
+}
+
+/// Writes one frame of a series.
+pub fn put(directory: &Path, series: &str, number: u64, frame: Frame) -> Result<(), Failure> {
+    let folder = directory.join(FOLDER);
+    fs::create_dir_all(&folder).map_err(|error| {
+        Failure::Run(format!(
+            "cannot make the folder {}: {error}",
+            folder.display()
+        ))
+    })?;
+    vtkhdf::write(&path(directory, series, number), [Ok(frame)])
+}
+
+/// Joins single frames into the file of their series.
+pub fn join(directory: &Path, series: &str, numbers: &[u64]) -> Result<(), Failure> {
+    let frames = numbers
+        .iter()
+        .map(|&number| vtkhdf::read_frame(&path(directory, series, number)));
+    vtkhdf::write(&directory.join(format!("{series}.vtkhdf")), frames)
+}
+
+fn path(directory: &Path, series: &str, number: u64) -> PathBuf {
+    let name = format!("{series}_{number:012}.vtkhdf");
+    directory.join(FOLDER).join(name)
 }
 
 /// Removes the single frames of a run directory; files of other names stay.
@@ -108,9 +121,8 @@ pub fn remove(directory: &Path) -> std::io::Result<()> {
         return Ok(());
     }
     let own = |name: &str| {
-        let series = SERIES
-            .iter()
-            .any(|series| name.starts_with(&format!("{series}_")));
+        let mut all = SERIES.iter().chain([&FIELDS]);
+        let series = all.any(|series| name.starts_with(&format!("{series}_")));
         series && (name.ends_with(".vtkhdf") || name.ends_with(".partial"))
     };
     for entry in fs::read_dir(&folder)? {

@@ -18,7 +18,8 @@ pub struct Unsaid {
     /// Local dump of the contacts beside a text dump.
     pub contacts: Option<PathBuf>,
     /// Names of the columns of the local dump that hold id1, id2, fx, fy, fz, then tx, ty, tz if there are torques;
-    /// empty: the first five columns.
+    /// empty: the first five columns. Columns that are to be added stand with a plus between them: LAMMPS' `pair/local`
+    /// gives the normal force of granular styles as fx, fy, fz and the tangential one as p1, p2, p3.
     pub contact_columns: Vec<String>,
     /// Lower and upper corner of the box (m), where the file has none or another is meant.
     pub domain: Option<[[f64; 3]; 2]>,

@@ -106,7 +106,11 @@ pub struct Provenance {
 }
 
 /// Calibrated laws that come with the program, by name: what `rheology.file` may say in the place of a path.
-pub const BUNDLED: [(&str, &str); 1] = [("moderate", include_str!("../rheologies/moderate.toml"))];
+pub const BUNDLED: [(&str, &str); 3] = [
+    ("moderate", include_str!("../rheologies/moderate.toml")),
+    ("gravel", include_str!("../rheologies/gravel.toml")),
+    ("glass", include_str!("../rheologies/glass.toml")),
+];
 
 impl RheologyFile {
     /// Reads and checks a file, or the bundled law of that name.

@@ -1,4 +1,4 @@
-//! VTKHDF: grains and contacts through time in files that ParaView opens as they are.
+//! VTKHDF: grains, contacts and fields through time in files that ParaView opens as they are.
 //!
 //! Layout: group `/VTKHDF` of type `PolyData`, version 2.0, one part a time step; points and cells of all
 //! steps one behind the other, and in `Steps` where each step begins.
@@ -17,6 +17,8 @@ pub enum Cells {
     Points,
     /// Points 2 k and 2 k + 1 are the ends of line k.
     Lines,
+    /// Points 4 k to 4 k + 3 go round quadrilateral k.
+    Quadrilaterals,
 }
 
 /// Values of a field.
@@ -64,18 +66,23 @@ impl Cells {
         match self {
             Cells::Points => 0,
             Cells::Lines => 1,
+            Cells::Quadrilaterals => 2,
         }
     }
 
     fn points_each(self) -> usize {
-        self.topology() + 1
+        match self {
+            Cells::Points => 1,
+            Cells::Lines => 2,
+            Cells::Quadrilaterals => 4,
+        }
     }
 
     /// Points and their only cells are the same: fields of points are drawn as spheres.
     fn data(self) -> &'static str {
         match self {
             Cells::Points => "PointData",
-            Cells::Lines => "CellData",
+            Cells::Lines | Cells::Quadrilaterals => "CellData",
         }
     }
 }
@@ -148,7 +155,10 @@ fn read_one(path: &Path) -> hdf5::Result<Frame> {
 fn read(path: &Path) -> hdf5::Result<Vec<Frame>> {
     let root = hdf5::File::open(path)?.group("VTKHDF")?;
     // There may be no cells at this instant; the fields are over something nevertheless.
-    let cells = if root.link_exists(Cells::Lines.data()) {
+    let corners: Vec<i64> = root.dataset("Polygons/Connectivity")?.read_raw()?;
+    let cells = if !corners.is_empty() {
+        Cells::Quadrilaterals
+    } else if root.link_exists(Cells::Lines.data()) {
         Cells::Lines
     } else {
         Cells::Points

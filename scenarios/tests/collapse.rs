@@ -4,7 +4,9 @@
 
 mod command;
 
+use colluvium::vtkhdf;
 use command::{colluvium, succeed, summary, table, value};
+use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
 
@@ -43,6 +45,40 @@ fn collapse_writes_front_and_deposit() {
     assert!(summary["ledger"]["mass_relative"].as_f64().unwrap().abs() < 1e-12);
     let report = std::fs::read_to_string(folder.path().join("c/report.html")).unwrap();
     assert!(report.contains("Profiles through time"));
+    fields_say_what_the_tables_say(&folder.path().join("c"), &deposit);
+}
+
+/// The fields at rest: their volume, their columns' heights, and pressure under the weight above.
+fn fields_say_what_the_tables_say(run: &Path, deposit: &[Vec<f64>]) {
+    let frames = vtkhdf::read_series(&run.join("fields.vtkhdf")).unwrap();
+    assert!(frames.len() > 5 && frames[0].time == 0.0 && !run.join("frames").exists());
+    let (_, flowing) = table(&run.join("flowing.csv"));
+    // Nothing flows before the column is let go or at the end; in between most of it does.
+    let most = flowing.iter().map(|row| row[1]).fold(0.0, f64::max);
+    assert!(flowing[0][1] == 0.0 && flowing.last().unwrap()[1] < 0.02 && most > 0.3);
+    assert!(flowing.iter().all(|row| (0.0..=row[1]).contains(&row[2])));
+    let last = frames.last().unwrap();
+    let scalars = |name: &str| {
+        let field = last.fields.iter().find(|f| f.name == name).unwrap();
+        let vtkhdf::Values::Scalars(values) = &field.values else {
+            panic!("{name} is not a number a cell")
+        };
+        values.clone()
+    };
+    let (fraction, pressure) = (scalars("fraction"), scalars("pressure"));
+    let edge = last.points[1][0] - last.points[0][0];
+    let area: f64 = fraction.iter().sum::<f64>() * edge * edge;
+    assert!((area / 0.08 - 1.0).abs() < 1e-2, "{area}");
+    for (cell, corners) in last.points.as_chunks::<4>().0.iter().enumerate() {
+        let column = (corners[0][0] / edge).round() as usize;
+        let above = deposit[column][1] - 0.5 * (corners[0][2] + corners[2][2]);
+        // ρ g of the bundled material; a pile's pressure is not hydrostatic, but bounded by friction.
+        let weight = 1500.0 * 9.81 * above;
+        if above > 0.05 {
+            let ratio = pressure[cell] / weight;
+            assert!((0.6..1.2).contains(&ratio), "{corners:?}: {ratio}");
+        }
+    }
 }
 
 #[test]

@@ -137,12 +137,12 @@ fn check(python: &Path, path: &Path, frames: &[vtkhdf::Frame]) {
             .split(' ')
             .map(|x| x.parse().unwrap())
             .collect();
-        let cells = frame.points.len()
-            / if frame.cells == vtkhdf::Cells::Lines {
-                2
-            } else {
-                1
-            };
+        let points_each = match frame.cells {
+            vtkhdf::Cells::Points => 1,
+            vtkhdf::Cells::Lines => 2,
+            vtkhdf::Cells::Quadrilaterals => 4,
+        };
+        let cells = frame.points.len() / points_each;
         let sum: f64 = frame.points.iter().flatten().sum();
         let close = |a: f64, b: f64| (a - b).abs() <= 1e-9 * (1.0 + b.abs());
         assert_eq!(
@@ -193,6 +193,63 @@ fn vtk_reads_grains_and_contacts_through_time() {
             Some(python) => check(python, &path, frames),
             None => eprintln!("{name}: no Python with VTK here, and none could be installed"),
         }
+    }
+}
+
+/// Cells of a continuum: quadrilaterals whose number changes from step to step.
+#[test]
+fn vtk_reads_quadrilaterals_through_time() {
+    let _alone = ONE_AT_A_TIME.lock();
+    let folder = tempfile::tempdir().unwrap();
+    let frame = |time: f64, cells: u32| {
+        let corners = |k: u32| {
+            let x = f64::from(k) + time;
+            [
+                [x, 0.0, 0.0],
+                [x + 1.0, 0.0, 0.0],
+                [x + 1.0, 0.0, 0.5],
+                [x, 0.0, 0.5],
+            ]
+        };
+        let numbers = || (0..cells).map(f64::from);
+        let field = |name: &str, values| vtkhdf::Field {
+            name: name.into(),
+            unit: "1".into(),
+            values,
+        };
+        vtkhdf::Frame {
+            time,
+            cells: vtkhdf::Cells::Quadrilaterals,
+            points: (0..cells).flat_map(corners).collect(),
+            fields: vec![
+                field(
+                    "pressure",
+                    vtkhdf::Values::Scalars(numbers().map(|k| k * k).collect()),
+                ),
+                field(
+                    "velocity",
+                    vtkhdf::Values::Vectors(numbers().map(|k| [k, 0.5, -time]).collect()),
+                ),
+                field(
+                    "flows",
+                    vtkhdf::Values::Counts((0..i64::from(cells)).collect()),
+                ),
+            ],
+        }
+    };
+    let frames = [frame(0.0, 3), frame(0.25, 5), frame(0.5, 2)];
+    let path = folder.path().join("fields.vtkhdf");
+    vtkhdf::write(&path, frames.iter().cloned().map(Ok)).unwrap();
+    let read = vtkhdf::read_series(&path).unwrap();
+    assert_eq!(read.len(), 3);
+    assert!(
+        read.iter()
+            .zip(&frames)
+            .all(|(a, b)| a.points == b.points && a.cells == b.cells)
+    );
+    match python() {
+        Some(python) => check(&python, &path, &frames),
+        None => eprintln!("no Python with VTK here, and none could be installed"),
     }
 }
 

@@ -277,6 +277,12 @@ impl<R: Rheology> SurfaceFlow<R> {
         &self.grid
     }
 
+    /// What fields are made from besides the state: neighbours, law, strain-rate floor.
+    pub(super) fn parts(&self) -> (&Topology, &R, f64) {
+        let floor = self.options.solver.strain_rate_floor;
+        (&self.topology, &self.rheology, floor)
+    }
+
     /// Volume of material.
     pub fn volume(&self) -> f64 {
         self.state.fractions.iter().sum::<f64>() * self.grid.cell_volume()

@@ -213,8 +213,9 @@ fn rows(table: &Table) -> Result<Vec<Row>, String> {
 
 fn links(table: &Table, unsaid: &Unsaid) -> Result<Vec<Link>, String> {
     let names = &unsaid.contact_columns;
-    let columns: Vec<usize> = if names.is_empty() {
-        (0..5).collect()
+    // For each number the columns that are added up to it.
+    let columns: Vec<Vec<usize>> = if names.is_empty() {
+        (0..5).map(|k| vec![k]).collect()
     } else {
         if names.len() != 5 && names.len() != 8 {
             return Err(format!(
@@ -222,7 +223,7 @@ fn links(table: &Table, unsaid: &Unsaid) -> Result<Vec<Link>, String> {
                 names.len()
             ));
         }
-        let find = |name: &String| {
+        let find = |name: &str| {
             let place = table.columns.iter().position(|c| c == name);
             place.ok_or_else(|| {
                 format!(
@@ -231,7 +232,8 @@ fn links(table: &Table, unsaid: &Unsaid) -> Result<Vec<Link>, String> {
                 )
             })
         };
-        names.iter().map(find).collect::<Result<_, _>>()?
+        let sum = |names: &String| names.split('+').map(find).collect();
+        names.iter().map(sum).collect::<Result<_, _>>()?
     };
     if table.columns.len() < columns.len() {
         return Err(format!(
@@ -243,7 +245,7 @@ fn links(table: &Table, unsaid: &Unsaid) -> Result<Vec<Link>, String> {
         .rows
         .iter()
         .map(|row| {
-            let at = |k: usize| row[columns[k]];
+            let at = |k: usize| columns[k].iter().map(|&c| row[c]).sum::<f64>();
             Link {
                 ids: [at(0) as i64, at(1) as i64],
                 force: Vector3::new(at(2), at(3), at(4)),

@@ -1,4 +1,5 @@
 use super::*;
+use nalgebra::Matrix3;
 
 fn all(path: &Path, unsaid: &Unsaid) -> Result<Vec<Snapshot>, Failure> {
     let mut list = Vec::new();
@@ -177,4 +178,71 @@ fn our_own_series_comes_back_as_it_was_seen() {
     let mut written = crate::frames::contacts(&snapshot);
     written.fields.sort_by(|a, b| a.name.cmp(&b.name));
     assert_eq!(frames[1], written);
+}
+
+/// A layer of 36 grains over 12 frozen ones, as LAMMPS 22 Jul 2025 leaves it (`lammps/deck.in`).
+fn layer(columns: &str) -> Vec<Snapshot> {
+    let folder = tempfile::tempdir().unwrap();
+    let (grains, local) = (folder.path().join("a.dump"), folder.path().join("c.dump"));
+    std::fs::write(&grains, include_str!("lammps/grains.dump")).unwrap();
+    std::fs::write(&local, include_str!("lammps/contacts.dump")).unwrap();
+    let unsaid = Unsaid {
+        contacts: Some(local),
+        contact_columns: columns.split(',').map(String::from).collect(),
+        fixed_types: vec![2],
+        ..Unsaid::default()
+    };
+    all(&grains, &unsaid).unwrap()
+}
+
+/// Σ over contacts of force × branch (N m): the whole branch between free grains, from the centre of the free one to
+/// the contact point at frozen ones.
+fn virial(snapshot: &Snapshot) -> Matrix3<f64> {
+    let grains = &snapshot.grains;
+    snapshot
+        .contacts
+        .iter()
+        .map(|c| {
+            let Partner::Grain(partner) = c.partner else {
+                panic!("no walls here")
+            };
+            let free = |grain: usize| if grains[grain].fixed { 0.0 } else { 1.0 };
+            c.force * (free(c.grain) * c.arm - free(partner) * c.partner_arm).transpose()
+        })
+        .sum()
+}
+
+/// LAMMPS' `compute stress/atom NULL pair`, summed over the free grains: equal grains have half of a contact each.
+/// What its `pair/local` calls fx, fy, fz is the normal force alone (negative control).
+#[test]
+fn forces_of_lammps_are_whole_with_their_tangential_columns() {
+    let whole = "c_pp[1],c_pp[2],c_pl[2]+c_pl[5],c_pl[3]+c_pl[6],c_pl[4]+c_pl[7]";
+    let [s] = &layer(whole)[..] else {
+        panic!("one instant")
+    };
+    let w = virial(s);
+    let (xx, yy, zz, xy, xz, yz) = (
+        -30.780_885,
+        -6.667_580_767,
+        -6.042_776_783,
+        15.695_700_56,
+        3.663_402_449,
+        3.736_686_202,
+    );
+    // LAMMPS' xy is x of the branch with y of the force.
+    let theirs = [xx, yy, zz, xy, xz, yz];
+    let ours = [
+        w[(0, 0)],
+        w[(1, 1)],
+        w[(2, 2)],
+        w[(1, 0)],
+        w[(2, 0)],
+        w[(2, 1)],
+    ];
+    for (a, b) in ours.iter().zip(theirs) {
+        // Nine digits are in the dump.
+        assert!((a - b).abs() < 1e-6, "{ours:?} {theirs:?}");
+    }
+    let bare = virial(&layer("c_pp[1],c_pp[2],c_pl[2],c_pl[3],c_pl[4]")[0]);
+    assert!((bare[(0, 0)].abs() - xx.abs()).abs() > 0.1);
 }

@@ -4,13 +4,18 @@ use super::bagnold::failure;
 use super::{Findings, Under};
 use crate::cost::Cost;
 use crate::failure::Failure;
+use crate::frames;
 use crate::progress::Bar;
 use crate::scene::{CollapseScene, Scene, ThinLayerKind};
 use crate::state_hash;
 use crate::summary::{Model, Quantity, Summary};
 use crate::table::Table;
+use crate::vtkhdf::{Cells, Field, Frame, Values};
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase, Front};
-use colluvium_continuum::free_surface::{SurfaceOptions, SurfaceState, SurfaceStep, ThinLayer};
+use colluvium_continuum::free_surface::{
+    CellFields, SurfaceOptions, SurfaceState, SurfaceStep, ThinLayer,
+};
+use colluvium_continuum::rheology::strain_rate_norm;
 use colluvium_dem::Record;
 
 /// What the continuum leaves out.
@@ -70,6 +75,8 @@ struct Course {
     fronts: Vec<Front>,
     /// Time, position and height, row by row.
     profiles: [Vec<f64>; 3],
+    /// Time, share of the volume that flows, and that flows where the equations are ill posed.
+    flowing: [Vec<f64>; 3],
     last: SurfaceStep,
     /// Steps, Newton iterations, cuts, cell-steps and steps at rest.
     counts: [u64; 5],
@@ -101,6 +108,10 @@ impl Course {
         let front = collapse.front(threshold);
         if self.fronts.last().is_none_or(|last| last.time < front.time) {
             self.fronts.push(front);
+            let [flows, ill] = collapse.flowing_shares();
+            for (column, value) in self.flowing.iter_mut().zip([front.time, flows, ill]) {
+                column.push(value);
+            }
         }
     }
 
@@ -134,6 +145,7 @@ impl Course {
                 .collect(),
         );
         put("course/profiles", self.profiles.concat());
+        put("course/flowing", self.flowing.concat());
         put("course/residuals", self.residuals.to_vec());
         put("course/step", vec![self.last.dt, self.last.max_speed]);
         record
@@ -161,7 +173,11 @@ impl Course {
         };
         let fronts = numbers("course/fronts")?;
         let profiles = numbers("course/profiles")?;
-        let rows = profiles.len() / 3;
+        let flowing = numbers("course/flowing")?;
+        let thirds = |all: &[f64]| {
+            let rows = all.len() / 3;
+            [0, 1, 2].map(|n| all[n * rows..(n + 1) * rows].to_vec())
+        };
         let step = numbers("course/step")?;
         let course = Course {
             fronts: fronts
@@ -172,7 +188,8 @@ impl Course {
                     height: f[2],
                 })
                 .collect(),
-            profiles: [0, 1, 2].map(|n| profiles[n * rows..(n + 1) * rows].to_vec()),
+            profiles: thirds(&profiles),
+            flowing: thirds(&flowing),
             last: SurfaceStep {
                 dt: *step.first()?,
                 max_speed: *step.get(1)?,
@@ -208,7 +225,11 @@ pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, 
         course.see_front(&collapse, threshold);
         course.see_profile(&collapse);
     }
+    let fresh = under.resumed.is_none();
     under.begin()?;
+    if fresh {
+        picture(under, &collapse, 0)?;
+    }
     let bar = Bar::new("column-collapse");
     while collapse.time() < end * (1.0 - 1e-9) && course.counts[4] < REST_STEPS {
         // Steps end at the instants of the tables, whenever a run was begun or resumed.
@@ -221,6 +242,7 @@ pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, 
             course.see_front(&collapse, threshold);
             if (next * PROFILES / FRONTS).fract() < 1e-6 {
                 course.see_profile(&collapse);
+                picture(under, &collapse, next as u64)?;
             }
         }
         bar.set(collapse.time() / end);
@@ -234,6 +256,11 @@ pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, 
     bar.clear();
     let wall_s = under.wall_s();
     course.see_front(&collapse, threshold);
+    join_pictures(
+        under,
+        &collapse,
+        (collapse.time() / end * FRONTS + 1e-6) as u64,
+    )?;
     let mut summary = Summary::begun("column-collapse", "run");
     describe(&mut summary, scene, &collapse, &course, wall_s);
     Ok(Findings {
@@ -241,6 +268,71 @@ pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, 
         tables: tables(&collapse, &course),
         grains: None,
     })
+}
+
+/// Writes the fields at an instant of the front.
+fn picture(under: &Under, collapse: &Collapse, instant: u64) -> Result<(), Failure> {
+    let frame = fields(collapse);
+    frames::put(under.directory.path(), frames::FIELDS, instant, frame)
+}
+
+/// Joins the fields at all instants of the profile up to the last one of the front, and those of the end.
+fn join_pictures(under: &Under, collapse: &Collapse, last: u64) -> Result<(), Failure> {
+    let every = (FRONTS / PROFILES) as u64;
+    let mut numbers: Vec<u64> = (0..=last).step_by(every as usize).collect();
+    if !last.is_multiple_of(every) {
+        picture(under, collapse, last)?;
+        numbers.push(last);
+    }
+    frames::join(under.directory.path(), frames::FIELDS, &numbers)
+}
+
+/// Cells with material as quadrilaterals in the plane y = 0.
+fn fields(collapse: &Collapse) -> Frame {
+    let cells = collapse.fields();
+    let law = collapse.rheology();
+    let corners = cells.iter().flat_map(|c| {
+        let ([x0, z0], [x1, z1]) = (c.lower, c.upper);
+        [[x0, 0.0, z0], [x1, 0.0, z0], [x1, 0.0, z1], [x0, 0.0, z1]]
+    });
+    let inertial = |c: &CellFields| match c.pressure {
+        p if p > 0.0 => law.inertial_number(c.strain_rate, p),
+        _ => 0.0,
+    };
+    let friction = |c: &CellFields| match c.pressure {
+        p if p > 0.0 => strain_rate_norm(c.stress) / p,
+        _ => 0.0,
+    };
+    let field = |name: &str, unit: &str, values: Values| Field {
+        name: name.into(),
+        unit: unit.into(),
+        values,
+    };
+    let scalars = |name: &str, unit: &str, of: &dyn Fn(&CellFields) -> f64| {
+        field(name, unit, Values::Scalars(cells.iter().map(of).collect()))
+    };
+    let flags = |name: &str, of: &dyn Fn(&CellFields) -> bool| {
+        let values = cells.iter().map(|c| i64::from(of(c)));
+        field(name, "1", Values::Counts(values.collect()))
+    };
+    let velocity = cells.iter().map(|c| [c.velocity[0], 0.0, c.velocity[1]]);
+    Frame {
+        time: collapse.time(),
+        cells: Cells::Quadrilaterals,
+        points: corners.collect(),
+        fields: vec![
+            scalars("fraction", "1", &|c| c.fraction),
+            field("velocity", "m/s", Values::Vectors(velocity.collect())),
+            scalars("pressure", "Pa", &|c| c.pressure),
+            scalars("deviatoric_stress_xx", "Pa", &|c| c.stress[0]),
+            scalars("shear_stress_xz", "Pa", &|c| c.stress[1]),
+            scalars("strain_rate", "1/s", &|c| c.strain_rate),
+            scalars("inertial_number", "1", &inertial),
+            scalars("friction", "1", &friction),
+            flags("flows", &|c| c.flows),
+            flags("well_posed", &|c| c.well_posed),
+        ],
+    }
 }
 
 fn speed(collapse: &Collapse, step: &SurfaceStep) -> f64 {
@@ -261,6 +353,10 @@ fn tables(collapse: &Collapse, course: &Course) -> Vec<Table> {
             .with("t", "s", times.clone())
             .with("x", "m", positions.clone())
             .with("h", "m", heights.clone()),
+        Table::new("flowing")
+            .with("t", "s", course.flowing[0].clone())
+            .with("flowing_share", "1", course.flowing[1].clone())
+            .with("ill_posed_share", "1", course.flowing[2].clone()),
     ]
 }
 
@@ -329,6 +425,20 @@ fn describe(
         speed(collapse, &course.last),
         "m/s",
         "at the end",
+    );
+    let [_, flowing, ill_posed] = &course.flowing;
+    let most = |shares: &[f64]| shares.iter().copied().fold(0.0, f64::max);
+    put(
+        "largest_flowing_share",
+        most(flowing),
+        "1",
+        "of the volume, at any instant of flowing.csv",
+    );
+    put(
+        "largest_ill_posed_share",
+        most(ill_posed),
+        "1",
+        "of the volume: flows where short waves grow without bound, C(I) > 0",
     );
     put("steps", steps as f64, "1", "");
     put(

@@ -1,0 +1,106 @@
+//! Fields at the centres of filled cells, for pictures and tables.
+
+use super::flow::SurfaceFlow;
+use super::operators::POINTS;
+use super::topology::NONE;
+use crate::discretisation::COMPONENTS;
+use crate::grid::{Axis, Boundary, DIMENSIONS};
+use crate::rheology::{Rheology, strain_rate_norm};
+
+/// Matter is rigid where it shears no faster than so many times the strain-rate floor ε.
+const RIGID: f64 = 10.0;
+/// Cells with less material are left out.
+const EMPTY: f64 = 1e-3;
+
+/// Fields of a cell, in the flow's units.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct CellFields {
+    /// Lower corner.
+    pub lower: [f64; DIMENSIONS],
+    /// Upper corner.
+    pub upper: [f64; DIMENSIONS],
+    /// Share that is filled.
+    pub fraction: f64,
+    /// Velocity, the mean of opposite faces.
+    pub velocity: [f64; DIMENSIONS],
+    /// Pressure; 0 in cells that have none of their own (less than half full).
+    pub pressure: f64,
+    /// ((σ_xx − σ_zz)/2, σ_xz), positive in tension, the mean over the filled part.
+    pub stress: [f64; COMPONENTS],
+    /// γ̇ = √(2 D:D), by central differences.
+    pub strain_rate: f64,
+    /// Whether it flows: γ̇ above ten times the strain-rate floor.
+    pub flows: bool,
+    /// Whether the equations of motion are well posed here; true where nothing flows.
+    pub well_posed: bool,
+}
+
+impl<R: Rheology> SurfaceFlow<R> {
+    /// Fields of all cells with material, x fastest.
+    pub fn cell_fields(&self) -> Vec<CellFields> {
+        let grid = self.grid();
+        let spacing = [0, 1].map(|axis| grid.axes()[axis].spacing());
+        let columns = grid.axes()[0].cells();
+        let (state, (topology, rheology, floor)) = (self.state(), self.parts());
+        let filled = |cell: usize| state.fractions[cell] > EMPTY;
+        let faces = |cell: usize, axis: usize| {
+            topology.cell_faces[cell][axis].map(|face| match face {
+                NONE => 0.0,
+                face => state.velocity[axis][face],
+            })
+        };
+        let velocity = |cell: usize| [0, 1].map(|axis| 0.5 * faces(cell, axis).iter().sum::<f64>());
+        let mut fields = Vec::new();
+        for cell in (0..state.fractions.len()).filter(|&cell| filled(cell)) {
+            let own = velocity(cell);
+            // ∂ of the other component along an axis, against neighbours with material or the wall.
+            let shear = |axis: usize| {
+                let component = 1 - axis;
+                let neighbours = topology.cell_neighbours[cell][axis];
+                let walls = match grid.axes()[axis] {
+                    Axis::Bounded { low, high, .. } => [Some(low), Some(high)],
+                    _ => [None, None],
+                };
+                let mut ends = [(own[component], 0.0); 2];
+                for ((end, &next), wall) in ends.iter_mut().zip(&neighbours).zip(walls) {
+                    match (next, wall) {
+                        (NONE, Some(Boundary::NoSlip { velocity })) => *end = (velocity, 0.5),
+                        (NONE, _) => {}
+                        (next, _) if filled(next) => *end = (velocity(next)[component], 1.0),
+                        _ => {}
+                    }
+                }
+                let [(below, back), (above, ahead)] = ends;
+                let cells: f64 = back + ahead;
+                if cells > 0.0 {
+                    (above - below) / (cells * spacing[axis])
+                } else {
+                    0.0
+                }
+            };
+            let stretch = |axis: usize| {
+                let [low, high] = faces(cell, axis);
+                (high - low) / spacing[axis]
+            };
+            let strain_rate = strain_rate_norm([stretch(0) - stretch(1), shear(0) + shear(1)]);
+            let pressure = state.pressure[cell].max(0.0);
+            let flows = strain_rate > RIGID * floor;
+            let points = &state.stress[cell * POINTS..(cell + 1) * POINTS];
+            let index = [cell % columns, cell / columns];
+            fields.push(CellFields {
+                lower: [0, 1].map(|axis| index[axis] as f64 * spacing[axis]),
+                upper: [0, 1].map(|axis| (index[axis] + 1) as f64 * spacing[axis]),
+                fraction: state.fractions[cell],
+                velocity: own,
+                pressure,
+                stress: [0, 1].map(|k| points.iter().map(|s| s[k]).sum::<f64>() / POINTS as f64),
+                strain_rate,
+                flows,
+                well_posed: !flows
+                    || pressure <= 0.0
+                    || rheology.is_well_posed(strain_rate, pressure),
+            });
+        }
+        fields
+    }
+}
