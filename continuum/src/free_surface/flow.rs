@@ -29,8 +29,6 @@ pub struct SurfaceOptions {
     /// Largest Δt Σ |u|/h over the axes, at most 1. Above ½ material moves in two parts with one
     /// velocity.
     pub courant: f64,
-    /// A step that is fine enough for any grid: longer ones keep to a Courant number of 0.45.
-    pub fine_step: f64,
     /// Largest time step.
     pub largest_step: f64,
     /// Factor by which a time step may exceed the one before.
@@ -45,7 +43,6 @@ impl Default for SurfaceOptions {
     fn default() -> Self {
         Self {
             courant: 0.45,
-            fine_step: 0.0125,
             largest_step: 0.05,
             growth: 1.3,
             thin_layer: ThinLayer::default(),
@@ -73,12 +70,6 @@ impl SurfaceOptions {
             "solver.courant",
             self.courant,
             "greater than 0, at most 1: no velocity is known farther than a cell from the material",
-        )?;
-        require(
-            self.fine_step >= 0.0,
-            "solver.fine_step",
-            self.fine_step,
-            "at least 0 and finite",
         )?;
         require(
             self.largest_step > 0.0,
@@ -114,8 +105,6 @@ pub struct SurfaceStep {
     pub max_speed: f64,
 }
 
-/// Courant number of steps whose material moves in one part.
-const ONE_PASS: f64 = 0.45;
 /// Largest Courant number of a part of a step: beyond, a fraction may leave [0, 1].
 const LONGEST_PASS: f64 = 0.5;
 /// Least time by which the velocity moves on, over the time step.
@@ -350,9 +339,8 @@ impl<R: Rheology> SurfaceFlow<R> {
         } else {
             first
         };
-        let rate = self.largest_rate().max(1e-300);
-        let longest = self.options.courant / rate;
-        let by_courant = (ONE_PASS / rate).max(self.options.fine_step).min(longest);
+        let rate = self.largest_rate();
+        let by_courant = self.options.courant / rate.max(1e-300);
         most.min(by_courant).min(self.options.largest_step)
     }
 
