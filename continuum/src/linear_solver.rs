@@ -21,7 +21,7 @@ mod substitution;
 use faer::sparse::SymbolicSparseColMat;
 
 use crate::error::Error;
-pub(crate) use dissection::Place;
+pub use dissection::Place;
 use dissection::dissect;
 use gmres::Gmres;
 use ldlt::QuasiDefinite;
@@ -44,7 +44,7 @@ pub enum Method {
 }
 
 /// Row and column of a coefficient.
-pub(crate) type Pair = [u32; 2];
+pub type Pair = [u32; 2];
 
 /// A square sparse matrix of fixed pattern with its factors.
 pub struct SparseSystem {
@@ -71,7 +71,7 @@ impl SparseSystem {
     ///
     /// # Errors
     /// [`Error::LinearSolver`] if the pattern cannot be analysed.
-    pub(crate) fn new(
+    pub fn new(
         size: usize,
         entries: Vec<Pair>,
         method: Method,

@@ -145,7 +145,8 @@ fn time_step_does_not_move_the_front() {
 }
 
 /// Frozen layers hold the front back, layers that only follow slide on for ever; depth-averaged
-/// ones come to rest and depend least on the grid.
+/// ones come to rest and their run-out depends least on the grid (1.3 % against 2.6 % from 64 to 128
+/// cells; the profiles of both change by 4.7e-3 of the area).
 #[test]
 #[ignore = "long: run by tests/validate.sh"]
 fn thin_layer_rules_compared() {
@@ -173,7 +174,7 @@ fn thin_layer_rules_compared() {
     assert!(averaged.2 && frozen.2 && !following.2);
     let change = |runouts: [f64; 2]| (runouts[1] / runouts[0] - 1.0).abs();
     assert!(change(averaged.0) < 0.02 && change(frozen.0) > change(averaged.0));
-    assert!(averaged.1 < 6e-3 && averaged.1 < frozen.1);
+    assert!(averaged.1 < 6e-3 && frozen.1 < 6e-3);
 }
 
 /// Profiles at t = 6 on three grids come closer and closer. Basilisk at a = 1.42: 4.6e-2 between 128
@@ -262,4 +263,5 @@ fn runout_beside_the_bands_of_experiments() {
         [band.contains(&plane), band.contains(&channel)]
     });
     println!("inside the bands (plane, channel): {found:?}");
+    assert!(found.iter().all(|[_, channel]| *channel));
 }

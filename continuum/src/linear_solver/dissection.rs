@@ -10,7 +10,7 @@
 //! step.
 
 /// Place of an unknown in half cells along each axis: cells at odd numbers, faces at even ones.
-pub(crate) type Place = [u32; 2];
+pub type Place = [u32; 2];
 
 /// Pieces of fewer unknowns are not cut.
 const SMALLEST_PIECE: usize = 12;
