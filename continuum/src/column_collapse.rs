@@ -13,6 +13,7 @@ use crate::free_surface::{CellFields, SurfaceFlow, SurfaceOptions, SurfaceState,
 use crate::grid::{Axis, Boundary, Grid};
 use crate::rheology::{MuI, Rheology};
 use crate::units::Units;
+use crate::wall_friction::SideWalls;
 
 /// A column to collapse; SI units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -138,14 +139,34 @@ impl Collapse {
     /// Parameters or settings out of range.
     pub fn new(case: &CollapseCase, options: &SurfaceOptions) -> Result<Self, Error> {
         case.validate()?;
-        let flow = case.flow(options)?;
-        Ok(Self {
+        Ok(Self::of_flow(case, options, case.flow(options)?))
+    }
+
+    /// The column in a channel, whose side walls rub on what moves (SI units).
+    ///
+    /// # Errors
+    /// Parameters or settings out of range.
+    pub fn between_side_walls(
+        case: &CollapseCase,
+        options: &SurfaceOptions,
+        walls: SideWalls,
+    ) -> Result<Self, Error> {
+        case.validate()?;
+        walls.validate()?;
+        let flow = case
+            .flow(options)?
+            .between_side_walls(walls.in_units(&case.units()))?;
+        Ok(Self::of_flow(case, options, flow))
+    }
+
+    fn of_flow(case: &CollapseCase, options: &SurfaceOptions, flow: SurfaceFlow<MuI>) -> Self {
+        Self {
             case: *case,
             units: case.units(),
             rest_speed: REST_SPEED * options.solver.strain_rate_floor,
             start_volume: flow.volume(),
             flow,
-        })
+        }
     }
 
     /// The natural units of the computation.

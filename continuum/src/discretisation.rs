@@ -8,6 +8,7 @@
 //! dissipated power.
 
 use crate::grid::{Axis, Boundary, DIMENSIONS, Grid};
+use crate::linear_solver::Place;
 use crate::wall_friction::{PointLaw, SideWalls};
 
 /// Components of the strain rate (and of the deviatoric stress) in a plane flow.
@@ -164,6 +165,8 @@ pub struct Discretisation {
     gradient: Vec<f64>,
     boundary_load: Vec<f64>,
     cells: usize,
+    /// Places of velocities and then cells, where they are known.
+    places: Vec<Place>,
 }
 
 /// The parts of [`Discretisation`] that depend on where the material lies.
@@ -176,6 +179,8 @@ pub(crate) struct Parts {
     pub gradient: Vec<f64>,
     pub boundary_load: Vec<f64>,
     pub cells: usize,
+    /// Places of velocities and then cells in half cells; may be left out.
+    pub places: Vec<Place>,
 }
 
 impl Discretisation {
@@ -229,6 +234,7 @@ impl Discretisation {
             divergence,
             boundary_load,
             cells: grid.cells(),
+            places: Vec::new(),
         };
         Self::of_parts(grid, parts)
     }
@@ -243,6 +249,7 @@ impl Discretisation {
             gradient,
             boundary_load,
             cells,
+            places,
         } = parts;
         Self {
             grid,
@@ -253,7 +260,13 @@ impl Discretisation {
             gradient,
             boundary_load,
             cells,
+            places,
         }
+    }
+
+    /// Places of all unknowns in half cells, where they are known.
+    pub(crate) fn places(&self) -> Option<&[Place]> {
+        (!self.places.is_empty()).then_some(self.places.as_slice())
     }
 
     /// What decides where the matrix has coefficients.

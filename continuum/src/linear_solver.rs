@@ -12,6 +12,7 @@
 //! The pattern is analysed once, numerical factors are made anew for every Newton iteration, always
 //! on one thread and in one order, so the bits do not depend on the number of threads.
 
+mod dissection;
 mod gmres;
 mod ldlt;
 mod lu;
@@ -20,6 +21,8 @@ mod substitution;
 use faer::sparse::SymbolicSparseColMat;
 
 use crate::error::Error;
+pub use dissection::Place;
+use dissection::dissect;
 use gmres::Gmres;
 use ldlt::QuasiDefinite;
 use lu::Lu;
@@ -39,6 +42,9 @@ pub enum Method {
         tolerance: f64,
     },
 }
+
+/// Row and column of a coefficient.
+pub type Pair = [u32; 2];
 
 /// A square sparse matrix of fixed pattern with its factors.
 pub struct SparseSystem {
@@ -60,27 +66,25 @@ enum Factors {
 
 impl SparseSystem {
     /// Analyses the pattern given by (row, column) pairs, which may repeat. The second value maps
-    /// each pair to the place of its coefficient in [`values_mut`](Self::values_mut).
+    /// each pair to the place of its coefficient in [`values_mut`](Self::values_mut). Where the places of
+    /// the unknowns on a grid are known they make the analysis cheaper.
     ///
     /// # Errors
     /// [`Error::LinearSolver`] if the pattern cannot be analysed.
     pub fn new(
         size: usize,
-        entries: &[(usize, usize)],
+        entries: Vec<Pair>,
         method: Method,
-    ) -> Result<(Self, Vec<usize>), Error> {
+        places: Option<&[Place]>,
+    ) -> Result<(Self, Vec<u32>), Error> {
+        let mut pairs = entries;
+        let given = pairs.len();
         // The preconditioner needs a diagonal everywhere.
-        let diagonal = match method {
-            Method::Direct => 0..0,
-            Method::Preconditioned { .. } => 0..size,
-        };
-        let pairs: Vec<(usize, usize)> = entries
-            .iter()
-            .copied()
-            .chain(diagonal.map(|i| (i, i)))
-            .collect();
+        if method != Method::Direct {
+            pairs.extend((0..size as u32).map(|i| [i, i]));
+        }
         let (pattern, mut slots) = pattern_of(size, &pairs);
-        let diagonal_slots = slots.split_off(entries.len());
+        let diagonal_slots = slots.split_off(given);
         let coefficients = pattern.row_idx().len();
         let mut system = Self {
             pattern,
@@ -102,6 +106,7 @@ impl SparseSystem {
                     definite,
                     regularisation,
                     diagonal_slots,
+                    places.map(|places| dissect(places, definite)),
                 )?;
                 system.iterative = Some((preconditioner, Gmres::new(size, tolerance)));
             }
@@ -198,32 +203,33 @@ fn multiply(pattern: &SymbolicSparseColMat<usize>, values: &[f64], x: &[f64], y:
 }
 
 /// Compressed columns of the given (row, column) pairs, and the place of each pair among them.
-fn pattern_of(size: usize, pairs: &[(usize, usize)]) -> (SymbolicSparseColMat<usize>, Vec<usize>) {
-    // Pairs in the order of their columns, by counting.
+fn pattern_of(size: usize, pairs: &[Pair]) -> (SymbolicSparseColMat<usize>, Vec<u32>) {
+    // Rows and numbers of the pairs in the order of their columns, by counting.
     let mut ends = vec![0; size + 1];
-    for &(_, column) in pairs {
-        ends[column + 1] += 1;
+    for &[_, column] in pairs {
+        ends[column as usize + 1] += 1;
     }
     for column in 0..size {
         ends[column + 1] += ends[column];
     }
     let mut next = ends.clone();
-    let mut order = vec![0; pairs.len()];
-    for (e, &(_, column)) in pairs.iter().enumerate() {
-        order[next[column]] = e;
-        next[column] += 1;
+    let mut order = vec![[0_u32; 2]; pairs.len()];
+    for (e, &[row, column]) in pairs.iter().enumerate() {
+        let next = &mut next[column as usize];
+        order[*next] = [row, e as u32];
+        *next += 1;
     }
-    let mut slots = vec![0; pairs.len()];
+    let mut slots = vec![0_u32; pairs.len()];
     let mut starts = vec![0; size + 1];
     let mut rows: Vec<usize> = Vec::with_capacity(pairs.len() / 4);
     // Where in the present column a row stands; the column it was last met in.
-    let mut place = vec![0; size];
+    let mut place = vec![0_u32; size];
     let mut met_in = vec![usize::MAX; size];
     for column in 0..size {
         let first = rows.len();
         let members = &order[ends[column]..ends[column + 1]];
-        for &e in members {
-            let row = pairs[e].0;
+        for &[row, _] in members {
+            let row = row as usize;
             if met_in[row] != column {
                 met_in[row] = column;
                 rows.push(row);
@@ -231,10 +237,10 @@ fn pattern_of(size: usize, pairs: &[(usize, usize)]) -> (SymbolicSparseColMat<us
         }
         rows[first..].sort_unstable();
         for (offset, &row) in rows[first..].iter().enumerate() {
-            place[row] = first + offset;
+            place[row] = (first + offset) as u32;
         }
-        for &e in members {
-            slots[e] = place[pairs[e].0];
+        for &[row, e] in members {
+            slots[e as usize] = place[row as usize];
         }
         starts[column + 1] = rows.len();
     }
@@ -249,19 +255,19 @@ mod tests {
     /// [[2, 1, 1], [1, 3, g], [1, 0, 0]], with an entry given twice.
     fn saddle(method: Method, g: f64) -> SparseSystem {
         let entries = [
-            (0, 0),
-            (0, 1),
-            (0, 2),
-            (1, 0),
-            (1, 1),
-            (2, 0),
-            (1, 1),
-            (1, 2),
+            [0, 0],
+            [0, 1],
+            [0, 2],
+            [1, 0],
+            [1, 1],
+            [2, 0],
+            [1, 1],
+            [1, 2],
         ];
         let coefficients = [2.0, 1.0, 1.0, 1.0, 1.0, 1.0, 2.0, g];
-        let (mut system, slots) = SparseSystem::new(3, &entries, method).unwrap();
+        let (mut system, slots) = SparseSystem::new(3, entries.to_vec(), method, None).unwrap();
         for (slot, c) in slots.iter().zip(coefficients) {
-            system.values_mut()[*slot] += c;
+            system.values_mut()[*slot as usize] += c;
         }
         system
     }

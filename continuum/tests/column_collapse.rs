@@ -10,6 +10,7 @@
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
 use colluvium_continuum::free_surface::{SurfaceOptions, ThinLayer};
 use colluvium_continuum::rheology::MuI;
+use colluvium_continuum::wall_friction::{SideWalls, WallFriction};
 
 fn case(aspect: f64, cells: usize, diameter: f64) -> CollapseCase {
     CollapseCase {
@@ -88,6 +89,24 @@ fn restart_gives_the_same_bits() {
     assert!(resumed.set_state(Default::default()).is_err());
 }
 
+/// A step of Courant number one moves its material in two parts and keeps every fraction in [0, 1].
+#[test]
+fn long_steps_move_material_in_parts() {
+    let case = case(6.26, 96, 1.0 / 134.0);
+    let options = SurfaceOptions {
+        courant: 1.0,
+        ..SurfaceOptions::default()
+    };
+    let mut collapse = Collapse::new(&case, &options).unwrap();
+    while collapse.time() < 4.0 {
+        collapse.step(4.0).unwrap();
+        for f in &collapse.flow().state().fractions {
+            assert!((0.0..=1.0 + 1e-9).contains(f), "{f}");
+        }
+    }
+    assert!(collapse.volume_drift().abs() < 1e-12);
+}
+
 /// Without an intermediate step from rest to any Δt: no blow-up and no cut.
 #[test]
 fn first_step_may_have_any_size() {
@@ -126,7 +145,8 @@ fn time_step_does_not_move_the_front() {
 }
 
 /// Frozen layers hold the front back, layers that only follow slide on for ever; depth-averaged
-/// ones come to rest and depend least on the grid.
+/// ones come to rest and their run-out depends least on the grid (1.3 % against 2.6 % from 64 to 128
+/// cells; the profiles of both change by 4.7e-3 of the area).
 #[test]
 #[ignore = "long: run by tests/validate.sh"]
 fn thin_layer_rules_compared() {
@@ -154,5 +174,94 @@ fn thin_layer_rules_compared() {
     assert!(averaged.2 && frozen.2 && !following.2);
     let change = |runouts: [f64; 2]| (runouts[1] / runouts[0] - 1.0).abs();
     assert!(change(averaged.0) < 0.02 && change(frozen.0) > change(averaged.0));
-    assert!(averaged.1 < 6e-3 && averaged.1 < frozen.1);
+    assert!(averaged.1 < 6e-3 && frozen.1 < 6e-3);
+}
+
+/// Profiles at t = 6 on three grids come closer and closer. Basilisk at a = 1.42: 4.6e-2 between 128
+/// and 256 cells, 4.9e-2 between 256 and 512.
+#[test]
+#[ignore = "long: run by tests/validate.sh"]
+fn deposits_converge_with_the_grid() {
+    for (aspect, diameter, grids) in [
+        (0.5, 1.0 / 30.0, [32, 64, 128]),
+        (1.42, 1.0 / 65.0, [64, 128, 256]),
+        (6.26, 1.0 / 134.0, [96, 192, 384]),
+    ] {
+        let cases = grids.map(|cells| case(aspect, cells, diameter));
+        let runs = cases.map(|case| run(&case, &SurfaceOptions::default(), 6.0).0);
+        let [coarse, middle, fine] = &runs;
+        let differences = [
+            profile_difference(coarse, middle),
+            profile_difference(middle, fine),
+        ];
+        let order = (differences[0] / differences[1]).log2();
+        let runouts = [0, 1, 2].map(|n| runout(&runs[n], &cases[n]));
+        println!(
+            "a = {aspect}, {grids:?} cells: profiles differ by {differences:.4?}, order {order:.2}, run-out {runouts:.3?}"
+        );
+        assert!(differences[1] < 0.02 && differences[1] < differences[0]);
+    }
+}
+
+/// Run-out of columns of glass beads (Jop, Forterre & Pouliquen 2006: tan 20.9°, tan 32.76°, I_0 =
+/// 0.279; d = 1.15 mm = L/87) against the bands of the experiments of Lube et al. and Lajeunesse et al., as
+/// Lagrée, Staron & Popinet (2011, eq. 3.1) state their laws. The channel of Lajeunesse et al. is
+/// 45 mm wide; its walls rub with tan 10.4° (Jop et al. 2005, glass beads on glass). Negative control:
+/// with μ_s = 2 every band refuses the run.
+#[test]
+#[ignore = "long: run by tests/validate.sh"]
+fn runout_beside_the_bands_of_experiments() {
+    let walls = SideWalls {
+        width: 0.045,
+        friction: WallFriction {
+            friction: 0.1835,
+            cohesion: 0.0,
+        },
+    };
+    let runout =
+        |mu_s: f64, mu_2: f64, (aspect, cells, length_scaled), walls: Option<SideWalls>| {
+            let height = 0.1 * aspect;
+            let case = CollapseCase {
+                aspect,
+                height,
+                gravity: 9.81,
+                rheology: MuI::new(mu_s, mu_2, 0.279, 1.15e-3, 0.6, 2500.0),
+                cells,
+                length_scaled,
+            };
+            let options = SurfaceOptions::default();
+            let mut collapse = match walls {
+                None => Collapse::new(&case, &options),
+                Some(walls) => Collapse::between_side_walls(&case, &options, walls),
+            }
+            .unwrap();
+            let end = 8.0 * case.units().time();
+            while collapse.time() < end * (1.0 - 1e-9) {
+                let step = collapse.step(end).unwrap();
+                if collapse.is_at_rest(&step) {
+                    break;
+                }
+            }
+            collapse.front(0.01 * height).position / case.width() - 1.0
+        };
+    let found = [
+        ((0.5, 96, 5.0), 0.60..1.10),
+        ((1.0, 96, 4.0), 1.20..2.20),
+        ((2.0, 96, 3.0), 2.40..3.60),
+        ((3.0, 128, 2.8), 3.95..4.78),
+        ((6.0, 192, 2.8), 6.27..7.59),
+    ]
+    .map(|(grid, band)| {
+        let plane = runout(0.381863, 0.643468, grid, None);
+        let channel = runout(0.381863, 0.643468, grid, Some(walls));
+        let stiff = runout(2.0, 2.3, grid, None);
+        println!(
+            "glass beads, a = {}: run-out {plane:.2}, in the channel {channel:.2}, experiments {band:?}; with μ_s = 2 {stiff:.2}",
+            grid.0
+        );
+        assert!(!band.contains(&stiff));
+        [band.contains(&plane), band.contains(&channel)]
+    });
+    println!("inside the bands (plane, channel): {found:?}");
+    assert!(found.iter().all(|[_, channel]| *channel));
 }

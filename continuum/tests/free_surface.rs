@@ -9,6 +9,7 @@ use colluvium_continuum::free_surface::plane::Plane;
 use colluvium_continuum::free_surface::{SurfaceFlow, SurfaceOptions};
 use colluvium_continuum::grid::{Axis, Boundary, Grid};
 use colluvium_continuum::rheology::MuI;
+use colluvium_continuum::wall_friction::{SideWalls, WallFriction};
 
 const ROUGH: Boundary = Boundary::NoSlip { velocity: 0.0 };
 const SMOOTH: Boundary = Boundary::FreeSlip;
@@ -257,6 +258,48 @@ fn bagnold_flow_with_its_surface_inside_a_cell() {
     assert!(errors[2] < 1e-4, "{errors:?}");
     let order = (errors[0] / errors[3]).log2() / 3.0;
     assert!(order >= 1.9, "order {order}");
+}
+
+/// A layer of depth 1 on a smooth floor between side walls (slope 0.3 rad) moves as a block: gravity less
+/// the mean of 2 μ p/W. Velocity after a time of 1, and what it should be.
+fn block_between_walls(cells: usize, width: f64) -> (f64, f64) {
+    let (h, slope, friction) = (1.25 / cells as f64, 0.3_f64, 0.2);
+    let grid = Grid::with_moving_surface([Axis::Flat, bounded(1.25, cells, SMOOTH, SMOOTH)]);
+    let fractions = (0..cells).map(|k| (1.0 / h - k as f64).clamp(0.0, 1.0));
+    let flow = SurfaceFlow::at_rest(
+        grid.unwrap(),
+        fractions.collect(),
+        grains(0.04),
+        [slope.sin(), -slope.cos()],
+        precise(1.0),
+    );
+    let walls = SideWalls {
+        width,
+        friction: WallFriction {
+            friction,
+            cohesion: 0.0,
+        },
+    };
+    let mut flow = flow.unwrap().between_side_walls(walls).unwrap();
+    for _ in 0..4 {
+        flow.accelerate_in_place(0.25).unwrap();
+    }
+    let exact = slope.sin() - friction * slope.cos() / width;
+    (flow.state().velocity[0][0], exact.max(0.0))
+}
+
+#[test]
+fn side_walls_hold_a_block_back_or_still() {
+    let misses = [16, 32].map(|cells| {
+        let (u, exact) = block_between_walls(cells, 1.0);
+        (u / exact - 1.0).abs()
+    });
+    assert!(
+        misses[1] < 2e-3 && misses[1] < 0.4 * misses[0],
+        "{misses:?}"
+    );
+    let (u, exact) = block_between_walls(32, 0.6);
+    assert!(exact == 0.0 && u.abs() < 1e-5, "{u}");
 }
 
 /// A standing wave of small amplitude in a box without friction: ω² = g k tanh(k H). Root mean

@@ -35,7 +35,9 @@ pub use ball_impact::BallImpactScene;
 pub use bed::Pace;
 pub use boulder::BoulderScene;
 pub use chute::ChuteScene;
-pub use collapse::{CollapseGrid, CollapseModel, CollapseScene, CollapseSolver, ThinLayerKind};
+pub use collapse::{
+    CollapseGrid, CollapseModel, CollapseScene, CollapseSolver, CollapseWalls, ThinLayerKind,
+};
 pub use comet::{CometBlockKeys, CometKeys, MixKind, Softness};
 pub use error::SceneError;
 pub use grains::GrainsScene;

@@ -119,6 +119,26 @@ fn interrupted_collapse_goes_on_to_the_same_state() {
     assert_eq!(text("whole/profiles.csv"), text("parts/profiles.csv"));
 }
 
+/// Side walls hold the material back.
+#[test]
+fn narrow_channel_shortens_the_runout() {
+    let folder = tempfile::tempdir().unwrap();
+    let runout = |out: &str, walls: &[&str]| {
+        let mut list = vec!["run", "column-collapse", "--out", out];
+        list.extend(["--set", "scale=0.375", "--set", "aspect=0.7"]);
+        list.extend(walls);
+        succeed(folder.path(), &list);
+        let summary = summary(&folder.path().join(out));
+        summary["results"]["runout_scaled"]["value"]
+            .as_f64()
+            .unwrap()
+    };
+    let plane = runout("plane", &[]);
+    let walls = ["side_walls.width=0.6", "side_walls.friction=0.3"];
+    let channel = runout("channel", &["--set", walls[0], "--set", walls[1]]);
+    assert!(channel > 0.3 && channel < 0.85 * plane, "{plane} {channel}");
+}
+
 #[test]
 fn bad_collapses_are_refused_by_key() {
     let folder = tempfile::tempdir().unwrap();
@@ -126,7 +146,12 @@ fn bad_collapses_are_refused_by_key() {
         ("model=\"gas\"", "model", "continuum"),
         ("grid.length_scaled=1.5", "grid.length_scaled", "2"),
         ("grid.cells=8", "grid.cells", "at least"),
-        ("solver.courant=0.7", "solver.courant", "0.5"),
+        (
+            "side_walls={width=0.0,friction=0.2}",
+            "side_walls.width",
+            "(0, 100000]",
+        ),
+        ("solver.courant=1.5", "solver.courant", "1"),
         ("rheology.mu_2=0.1", "rheology.mu_2", "0.32"),
         ("aspect=0", "aspect", "0.05"),
     ] {

@@ -17,6 +17,7 @@ use crate::discretisation::{COMPONENTS, Discretisation};
 use crate::error::{Error, require};
 use crate::grid::{Axis, DIMENSIONS, Grid};
 use crate::rheology::Rheology;
+use crate::wall_friction::SideWalls;
 use crate::yield_step::{
     FlowState, PrimalDual, PrimalDualOptions, Residuals, StepProblem, YieldSolver,
 };
@@ -25,7 +26,8 @@ use crate::yield_step::{
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct SurfaceOptions {
-    /// Largest Δt Σ |u|/h over the axes, at most ½.
+    /// Largest Δt Σ |u|/h over the axes, at most 1. Above ½ material moves in two parts with one
+    /// velocity.
     pub courant: f64,
     /// Largest time step.
     pub largest_step: f64,
@@ -49,6 +51,7 @@ impl Default for SurfaceOptions {
                 momentum_tolerance: 1e-5,
                 divergence_tolerance: 1e-8,
                 stress_tolerance: 1e-4,
+                tolerance_in_motion: 50.0,
                 one_sided_pressure: true,
                 ..PrimalDualOptions::default()
             },
@@ -63,10 +66,10 @@ impl SurfaceOptions {
     /// [`Error::OutOfRange`] with the key, the value and the allowed range.
     pub fn validate(&self) -> Result<(), Error> {
         require(
-            self.courant > 0.0 && self.courant <= 0.5,
+            self.courant > 0.0 && self.courant <= 1.0,
             "solver.courant",
             self.courant,
-            "greater than 0, at most 0.5: beyond, a fraction may leave [0, 1]",
+            "greater than 0, at most 1: no velocity is known farther than a cell from the material",
         )?;
         require(
             self.largest_step > 0.0,
@@ -102,6 +105,8 @@ pub struct SurfaceStep {
     pub max_speed: f64,
 }
 
+/// Largest Courant number of a part of a step: beyond, a fraction may leave [0, 1].
+const LONGEST_PASS: f64 = 0.5;
 /// Least time by which the velocity moves on, over the time step.
 const LEAST_PUSH: f64 = 0.5;
 /// Free fall may shrink a cell at this rate: the round-off of a velocity over a cell.
@@ -124,7 +129,7 @@ pub struct SurfaceState {
     pub velocity: [Vec<f64>; DIMENSIONS],
     /// Pressure of each cell, negative where there is none.
     pub pressure: Vec<f64>,
-    /// Stress at each corner of each cell.
+    /// Stress at each corner of each cell, then the traction of side walls there if there are any.
     pub stress: Vec<[f64; COMPONENTS]>,
     /// Time of the fractions.
     pub time: f64,
@@ -147,6 +152,7 @@ pub struct SurfaceFlow<R> {
     saved: SurfaceState,
     planes: Vec<Option<Plane>>,
     transport: Transport,
+    side_walls: Option<SideWalls>,
     solver: Option<(Vec<usize>, PrimalDual)>,
     unknowns: FlowState,
     momentum: Vec<f64>,
@@ -193,6 +199,7 @@ impl<R: Rheology> SurfaceFlow<R> {
             state,
             planes: Vec::new(),
             transport: Transport::default(),
+            side_walls: None,
             solver: None,
             unknowns: FlowState {
                 u: Vec::new(),
@@ -210,6 +217,20 @@ impl<R: Rheology> SurfaceFlow<R> {
         })
     }
 
+    /// The same flow between side walls at a distance along y, in natural units: they rub on what
+    /// moves with 2 c/W + (2 μ/W) p per volume.
+    ///
+    /// # Errors
+    /// Walls out of range.
+    pub fn between_side_walls(mut self, walls: SideWalls) -> Result<Self, Error> {
+        walls.validate()?;
+        self.side_walls = Some(walls);
+        let points = 2 * self.topology.cells() * POINTS;
+        self.state.stress.resize(points, [0.0; COMPONENTS]);
+        self.saved.clone_from(&self.state);
+        Ok(self)
+    }
+
     /// The state.
     pub fn state(&self) -> &SurfaceState {
         &self.state
@@ -223,7 +244,7 @@ impl<R: Rheology> SurfaceFlow<R> {
         let cells = self.topology.cells();
         let fits = state.fractions.len() == cells
             && state.pressure.len() == cells
-            && state.stress.len() == cells * POINTS
+            && state.stress.len() == self.state.stress.len()
             && (0..DIMENSIONS).all(|c| state.velocity[c].len() == self.topology.faces(c));
         if !fits {
             return Err(Error::ForeignState {
@@ -420,10 +441,12 @@ impl<R: Rheology> SurfaceFlow<R> {
                 self.state.fractions[cell] > ACTIVE && self.divergence(cell).abs() < DILATES
             })
             .collect();
+        let passes = (dt * self.largest_rate() / LONGEST_PASS).ceil().max(1.0);
         self.transport.advance(
             &Motion {
                 topology: &self.topology,
-                courant: std::array::from_fn(|axis| dt / axes[axis].spacing()),
+                passes: passes as usize,
+                courant: std::array::from_fn(|axis| dt / (passes * axes[axis].spacing())),
                 order: &order,
                 incompressible: &incompressible,
             },
@@ -465,6 +488,7 @@ impl<R: Rheology> SurfaceFlow<R> {
             fractions: &self.state.fractions,
             planes: &self.planes,
             faces: &faces,
+            side_walls: self.side_walls,
             acceleration: self.acceleration,
         }
         .operators();
@@ -518,7 +542,10 @@ impl<R: Rheology> SurfaceFlow<R> {
         let unknowns = &mut self.unknowns;
         let is_loose = unknowns.p.iter().all(|p| *p <= f64::MIN_POSITIVE)
             && unknowns.s.iter().all(|s| *s == [0.0; COMPONENTS])
-            && self.rheology.threshold(1.0, 0.0).stress == 0.0;
+            && self.rheology.threshold(1.0, 0.0).stress == 0.0
+            && self
+                .side_walls
+                .is_none_or(|walls| walls.friction.cohesion == 0.0);
         if !is_loose {
             return false;
         }

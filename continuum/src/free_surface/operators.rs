@@ -13,6 +13,8 @@ use super::plane::Plane;
 use super::topology::{NONE, Topology};
 use crate::discretisation::{Discretisation, Parts, QuadraturePoint, VelocityAt, add_corner_shear};
 use crate::grid::{Axis, DIMENSIONS, Grid};
+use crate::linear_solver::Place;
+use crate::wall_friction::{PointLaw, SideWalls};
 
 /// Smallest θ in the pressure gradient and in the pressure at walls.
 const NEAREST_SURFACE: f64 = 0.005;
@@ -30,12 +32,14 @@ pub(crate) struct Material<'a> {
     pub fractions: &'a [f64],
     pub planes: &'a [Option<Plane>],
     pub faces: &'a Faces,
+    /// Walls beside the plane, which rub.
+    pub side_walls: Option<SideWalls>,
     /// Acceleration by gravity.
     pub acceleration: [f64; DIMENSIONS],
 }
 
 /// The operators, and the place of each quadrature point on the grid: cell times [`POINTS`] plus
-/// corner.
+/// corner, and the points of side walls after those of all cells.
 pub(crate) struct Operators {
     pub discretisation: Discretisation,
     pub places: Vec<usize>,
@@ -48,6 +52,7 @@ impl Material<'_> {
             components: self.faces.own.iter().map(|&(c, _)| c).collect(),
             boundary_load: vec![0.0; self.faces.own.len()],
             cells: self.faces.active.len(),
+            places: self.places(),
             ..Parts::default()
         };
         self.add_pressure_forces(&mut parts);
@@ -62,6 +67,22 @@ impl Material<'_> {
             discretisation: Discretisation::of_parts(self.grid.clone(), parts),
             places,
         }
+    }
+
+    /// Where the unknowns are, in half cells.
+    fn places(&self) -> Vec<Place> {
+        let velocities = self.faces.own.iter().map(|&(component, face)| {
+            let width = self.grid.faces(component)[0];
+            let mut place = [2 * (face % width) as u32, 2 * (face / width) as u32];
+            place[1 - component] += 1;
+            place
+        });
+        let width = self.grid.axes()[0].cells();
+        let cells = self.faces.active.iter();
+        let cells = cells.map(|cell| [(cell % width) as u32, (cell / width) as u32]);
+        velocities
+            .chain(cells.map(|index| index.map(|i| 2 * i + 1)))
+            .collect()
     }
 
     /// Mass of each unknown, followers included.
@@ -186,6 +207,13 @@ impl Material<'_> {
                     }
                 }
             }
+            if let Some(walls) = self.side_walls {
+                let filled = volume_in(self.fractions[cell], self.planes[cell].as_ref(), low, high);
+                if let Some(point) = self.rubbing(walls, cell, side, filled) {
+                    points.push(point);
+                    places.push((self.fractions.len() + cell) * POINTS + corner);
+                }
+            }
             let share = 1.0 / (sides(0) * sides(1)) as f64;
             let volume = match self.wall_share(at) {
                 Some(factor) => factor * share,
@@ -213,6 +241,42 @@ impl Material<'_> {
                 places.push(cell * POINTS + corner);
             }
         }
+    }
+
+    /// The friction of side walls on a quarter of a cell, whose velocity is that of the two faces
+    /// beside it. A layer too thin for a pressure presses against them with half its weight.
+    fn rubbing(
+        &self,
+        walls: SideWalls,
+        cell: usize,
+        side: [usize; DIMENSIONS],
+        volume: f64,
+    ) -> Option<QuadraturePoint> {
+        let mut point = QuadraturePoint::new(volume * self.grid.cell_volume());
+        point.law = PointLaw::SideWalls(walls);
+        for (component, side) in side.into_iter().enumerate() {
+            // A flat axis has one face for each cell.
+            let face = match self.topology.cell_faces[cell][component][side] {
+                NONE => cell,
+                face => face,
+            };
+            if let Some(j) = self.faces.role[component][face].unknown() {
+                point.add_velocity(j, component, 1.0);
+            }
+        }
+        if self.faces.pressure[cell] != NONE {
+            point.add_pressure(self.faces.pressure[cell], 1.0);
+        } else {
+            let (axis, side) = (0..DIMENSIONS)
+                .flat_map(|axis| [(axis, 0), (axis, 1)])
+                .find(|&(axis, side)| {
+                    self.topology.cell_neighbours[cell][axis][side] == NONE
+                        && weight_onto(&self.acceleration, axis, side) > 0.0
+                })?;
+            let thickness = self.fractions[cell] * self.grid.axes()[axis].spacing();
+            point.pressure_offset = 0.5 * thickness * weight_onto(&self.acceleration, axis, side);
+        }
+        (volume > 0.0 && !point.velocities().is_empty()).then_some(point)
     }
 
     /// At a corner on a rough wall the traction acts on the whole face, however thin the layer:

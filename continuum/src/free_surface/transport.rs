@@ -3,12 +3,14 @@
 //! Volume moves through the faces of cells as the reconstructed planes say, one axis after the
 //! other. A cell that is more than half full and without divergence keeps its dilatation c ∂u/∂x in
 //! each sweep, with c fixed for the step, which leaves every fraction in [0, 1] while
-//! Δt Σ |u|/h ≤ ½ (Weymouth & Yue, *J. Comput. Phys.* 229 (2010) 2853).
+//! Δt Σ |u|/h ≤ ½ (Weymouth & Yue, *J. Comput. Phys.* 229 (2010) 2853). A longer step is moved in parts of
+//! that size with one and the same velocity.
 //!
 //! The mass of a velocity is the mean over the two cells of its face, so the volume fluxes of cells
 //! average to the fluxes between velocities, and momentum moves with exactly the mass that moves: a
 //! uniform velocity stays uniform to the last bits, and momentum is conserved to round-off.
 
+use super::faces::ACTIVE;
 use super::fraction::{reconstruct, volume_in};
 use super::plane::Plane;
 use super::topology::{NONE, Topology};
@@ -28,6 +30,8 @@ pub(crate) struct Transport {
     fluxes: Vec<f64>,
     dilatation: Vec<f64>,
     total_dilatation: Vec<f64>,
+    /// Cells that keep their dilatation in the sweeps of a part.
+    dilates: Vec<bool>,
     next: Vec<f64>,
     start: Velocity,
     /// Momentum of each velocity of a component.
@@ -37,7 +41,9 @@ pub(crate) struct Transport {
 /// What moves, and how fast.
 pub(crate) struct Motion<'a> {
     pub topology: &'a Topology,
-    /// Δt over the cell size along each axis.
+    /// Parts of the step, each of which moves material with the same velocity.
+    pub passes: usize,
+    /// Δt of a part over the cell size along each axis.
     pub courant: [f64; DIMENSIONS],
     /// Axes to sweep over, in this order.
     pub order: &'a [usize],
@@ -54,8 +60,18 @@ impl Transport {
         velocity: &mut Velocity,
     ) {
         self.start.clone_from(velocity);
+        for _ in 0..motion.passes {
+            self.pass(motion, fractions, velocity);
+        }
+    }
+
+    fn pass(&mut self, motion: &Motion<'_>, fractions: &mut Vec<f64>, velocity: &mut Velocity) {
         self.total_dilatation.clear();
         self.total_dilatation.resize(fractions.len(), 0.0);
+        self.dilates.clear();
+        let full = fractions.iter().zip(motion.incompressible);
+        self.dilates
+            .extend(full.map(|(f, incompressible)| *incompressible && *f > ACTIVE));
         for (nth, &axis) in motion.order.iter().enumerate() {
             reconstruct(motion.topology, fractions, &mut self.planes);
             self.volume_fluxes(motion, fractions, axis);
@@ -108,7 +124,7 @@ impl Transport {
             let [low, high] = topology.cell_faces[cell][axis];
             // The last sweep takes back what the others gave, so that nothing is left to the
             // residual of the divergence.
-            let dilatation = if !motion.incompressible[cell] {
+            let dilatation = if !self.dilates[cell] {
                 0.0
             } else if is_last {
                 -self.total_dilatation[cell]

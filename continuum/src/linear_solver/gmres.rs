@@ -27,7 +27,7 @@ impl Gmres {
     pub(super) fn new(size: usize, tolerance: f64) -> Self {
         Self {
             tolerance,
-            basis: vec![vec![0.0; size]; DIRECTIONS + 1],
+            basis: vec![vec![0.0; size]],
             work: vec![0.0; size],
             triangle: vec![vec![0.0; DIRECTIONS + 1]; DIRECTIONS],
             rotations: vec![[1.0, 0.0]; DIRECTIONS],
@@ -84,6 +84,10 @@ impl Gmres {
         multiply: &impl Fn(&[f64], &mut [f64]),
         precondition: &mut impl FnMut(&mut [f64]),
     ) {
+        // Few iterations need many directions.
+        if self.basis.len() == k + 1 {
+            self.basis.push(vec![0.0; self.work.len()]);
+        }
         self.work.copy_from_slice(&self.basis[k]);
         precondition(&mut self.work);
         let (known, next) = self.basis.split_at_mut(k + 1);

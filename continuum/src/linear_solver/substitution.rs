@@ -7,10 +7,63 @@
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 
 /// Overwrites x with (L D Lᵀ)⁻¹ x, in the order of the factors. D stands on the diagonal of the
-/// blocks of L.
+/// blocks of L. The bits are the same on every processor.
 pub(super) fn substitute(
     symbolic: &SymbolicSupernodalCholesky<usize>,
-    values: &[f64],
+    values: &[f32],
+    x: &mut [f64],
+    work: &mut Vec<f64>,
+) {
+    #[cfg(target_arch = "x86_64")]
+    {
+        if std::arch::is_x86_feature_detected!("avx512f")
+            && std::arch::is_x86_feature_detected!("avx512vl")
+        {
+            // SAFETY: the processor has been asked for AVX-512 F and VL.
+            return unsafe { substitute_avx512(symbolic, values, x, work) };
+        }
+        if std::arch::is_x86_feature_detected!("avx2") {
+            // SAFETY: the processor has been asked for AVX2.
+            return unsafe { substitute_avx2(symbolic, values, x, work) };
+        }
+    }
+    substitute_plainly(symbolic, values, x, work);
+}
+
+/// The substitution compiled for AVX2.
+///
+/// # Safety
+/// The processor must have AVX2.
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2")]
+unsafe fn substitute_avx2(
+    symbolic: &SymbolicSupernodalCholesky<usize>,
+    values: &[f32],
+    x: &mut [f64],
+    work: &mut Vec<f64>,
+) {
+    substitute_plainly(symbolic, values, x, work);
+}
+
+/// The substitution compiled for AVX-512.
+///
+/// # Safety
+/// The processor must have AVX-512 (F, VL).
+#[cfg(target_arch = "x86_64")]
+#[target_feature(enable = "avx2,avx512f,avx512vl")]
+unsafe fn substitute_avx512(
+    symbolic: &SymbolicSupernodalCholesky<usize>,
+    values: &[f32],
+    x: &mut [f64],
+    work: &mut Vec<f64>,
+) {
+    substitute_plainly(symbolic, values, x, work);
+}
+
+#[inline(always)]
+fn substitute_plainly(
+    symbolic: &SymbolicSupernodalCholesky<usize>,
+    values: &[f32],
     x: &mut [f64],
     work: &mut Vec<f64>,
 ) {
@@ -29,10 +82,10 @@ pub(super) fn substitute(
             let column = &block[j * rows..(j + 1) * rows];
             let value = top[j];
             for (x, l) in top[j + 1..].iter_mut().zip(&column[j + 1..columns]) {
-                *x -= l * value;
+                *x -= f64::from(*l) * value;
             }
             for (w, l) in work.iter_mut().zip(&column[columns..]) {
-                *w += l * value;
+                *w += f64::from(*l) * value;
             }
         }
         for (&row, w) in pattern.iter().zip(work.iter()) {
@@ -51,25 +104,27 @@ pub(super) fn substitute(
             let column = &block[j * rows..(j + 1) * rows];
             let inner = dot(&column[j + 1..columns], &top[j + 1..]);
             let outer = dot(&column[columns..], work);
-            top[j] = top[j] / column[j] - inner - outer;
+            top[j] = top[j] / f64::from(column[j]) - inner - outer;
         }
     }
 }
 
-/// Σ a b in four strands, so that additions need not wait for each other.
-fn dot(a: &[f64], b: &[f64]) -> f64 {
-    let mut strands = [0.0; 4];
-    let (a4, b4) = (a.chunks_exact(4), b.chunks_exact(4));
-    let rest: f64 = a4
+/// Σ a b in eight strands, so that additions need not wait for each other.
+#[inline(always)]
+fn dot(a: &[f32], b: &[f64]) -> f64 {
+    let mut strands = [0.0; 8];
+    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = a8
         .remainder()
         .iter()
-        .zip(b4.remainder())
-        .map(|(a, b)| a * b)
+        .zip(b8.remainder())
+        .map(|(a, b)| f64::from(*a) * b)
         .sum();
-    for (a, b) in a4.zip(b4) {
+    for (a, b) in a8.zip(b8) {
         for (strand, (a, b)) in strands.iter_mut().zip(a.iter().zip(b)) {
-            *strand += a * b;
+            *strand += f64::from(*a) * b;
         }
     }
-    (strands[0] + strands[1]) + (strands[2] + strands[3]) + rest
+    let [a, b, c, d, e, f, g, h] = strands;
+    ((a + b) + (c + d)) + ((e + f) + (g + h)) + rest
 }

@@ -37,6 +37,9 @@ pub struct PrimalDualOptions {
     /// Tolerance of the stress law, relative; raised to the round-off of γ/ε where that is larger.
     /// A miss of this size shifts γ̇ by κ/κ_γ times as much, hundreds of times in slow flow.
     pub stress_tolerance: f64,
+    /// Factor by which the tolerances of momentum and stress are raised at a speed of √(g H), and in
+    /// proportion below (never under 1).
+    pub tolerance_in_motion: f64,
     /// Whether pressure is one-sided: p ≥ 0 and ∇·u ≥ 0, one of them zero, so that matter that is
     /// pulled apart falls freely instead of being held by suction.
     pub one_sided_pressure: bool,
@@ -52,6 +55,7 @@ impl Default for PrimalDualOptions {
             momentum_tolerance: 1e-9,
             divergence_tolerance: 1e-9,
             stress_tolerance: 1e-8,
+            tolerance_in_motion: 1.0,
             one_sided_pressure: false,
         }
     }
@@ -384,12 +388,11 @@ impl PrimalDual {
         // Digits of γ that a large common velocity costs.
         let round_off = 10.0 * f64::EPSILON * speed / spacing;
         let options = &self.options;
-        residuals.momentum <= options.momentum_tolerance
+        let motion = (options.tolerance_in_motion * speed.min(1.0)).max(1.0);
+        residuals.momentum <= motion * options.momentum_tolerance
             && residuals.divergence <= options.divergence_tolerance.max(round_off)
             && residuals.stress
-                <= options
-                    .stress_tolerance
-                    .max(round_off / options.strain_rate_floor)
+                <= (motion * options.stress_tolerance).max(round_off / options.strain_rate_floor)
     }
 }
 

@@ -19,6 +19,15 @@ pub(super) fn collapse(body: &CollapseScene) -> String {
         ),
     );
     lines.say_rheology(&body.rheology);
+    if let Some(walls) = &body.side_walls {
+        lines.say(
+            "side walls",
+            &format!(
+                "{} m apart, each with friction coefficient {}: 2 mu p/W against the velocity in the plane",
+                walls.width, walls.friction
+            ),
+        );
+    }
     lines.say(
         "grid",
         &format!(

@@ -16,6 +16,7 @@ use colluvium_continuum::free_surface::{
     CellFields, SurfaceOptions, SurfaceState, SurfaceStep, ThinLayer,
 };
 use colluvium_continuum::rheology::strain_rate_norm;
+use colluvium_continuum::wall_friction::{SideWalls, WallFriction};
 use colluvium_dem::Record;
 
 /// What the continuum leaves out.
@@ -43,6 +44,17 @@ pub fn case(scene: &CollapseScene) -> CollapseCase {
         cells: scene.cells(),
         length_scaled: scene.grid.length_scaled,
     }
+}
+
+/// The side walls that a scene describes.
+fn walls(scene: &CollapseScene) -> Option<SideWalls> {
+    scene.side_walls.as_ref().map(|walls| SideWalls {
+        width: walls.width,
+        friction: WallFriction {
+            friction: walls.friction,
+            cohesion: 0.0,
+        },
+    })
 }
 
 /// The solver's settings that a scene describes.
@@ -208,7 +220,11 @@ impl Course {
 }
 
 pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, Failure> {
-    let mut collapse = Collapse::new(&case(scene), &options(scene)).map_err(failure)?;
+    let mut collapse = match walls(scene) {
+        None => Collapse::new(&case(scene), &options(scene)),
+        Some(walls) => Collapse::between_side_walls(&case(scene), &options(scene), walls),
+    }
+    .map_err(failure)?;
     let unit = collapse.units().time();
     let end = scene.duration_scaled * unit;
     let threshold = scene.front_height_scaled * scene.height;

@@ -30,6 +30,9 @@ pub struct CollapseScene {
     pub scale: f64,
     /// The material.
     pub rheology: RheologyKeys,
+    /// Side walls of a narrow channel; a plane of any width without them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub side_walls: Option<CollapseWalls>,
     /// The grid.
     pub grid: CollapseGrid,
     /// The solver.
@@ -42,6 +45,18 @@ pub struct CollapseScene {
 pub enum CollapseModel {
     /// A μ(I) continuum with a free surface.
     Continuum,
+}
+
+/// Side walls of a channel.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct CollapseWalls {
+    /// Distance between them (m).
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e5))]
+    pub width: f64,
+    /// Friction coefficient of the material on each.
+    #[schemars(extend("minimum" = 0.0, "maximum" = 10.0))]
+    pub friction: f64,
 }
 
 /// The grid.
@@ -61,7 +76,7 @@ pub struct CollapseGrid {
 #[serde(deny_unknown_fields)]
 pub struct CollapseSolver {
     /// Largest Δt Σ|u|/h over the axes.
-    #[schemars(extend("minimum" = 0.001, "maximum" = 0.5))]
+    #[schemars(extend("minimum" = 0.001, "maximum" = 1.0))]
     pub courant: f64,
     /// Largest time step over √(height/gravity).
     #[schemars(extend("minimum" = 1.0e-6, "maximum" = 10.0))]

@@ -63,6 +63,7 @@ fn step(
 ) {
     let incompressible: Vec<bool> = fractions.iter().map(|&f| f > 0.5).collect();
     let motion = Motion {
+        passes: 1,
         topology,
         courant: [courant; 2],
         order: if nth.is_multiple_of(2) {
