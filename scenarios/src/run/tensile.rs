@@ -363,7 +363,8 @@ impl TensileScene {
         let up = Vector3::new(0.0, 0.0, 0.5 * self.sample.height);
         shop.place(UnitQuaternion::identity(), up)?;
         let relaxation = comet::relaxation(shop.materials);
-        shop.trim(&self.shape(), false)?;
+        // A wall must not cut through grains.
+        shop.trim(&self.shape(), self.clamp.kind == ClampKind::Wall)?;
         let mut around = self.comet().last(origin)?;
         match self.clamp.kind {
             ClampKind::Gripped => {
