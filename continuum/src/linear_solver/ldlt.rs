@@ -9,8 +9,10 @@
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::ldlt::factor::LdltRegularization;
 use faer::perm::PermRef;
+use faer::sparse::linalg::SupernodalThreshold;
 use faer::sparse::linalg::cholesky::{
-    LdltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering, factorize_symbolic_cholesky,
+    CholeskySymbolicParams, LdltRef, SymbolicCholesky, SymbolicCholeskyRaw, SymmetricOrdering,
+    factorize_symbolic_cholesky,
 };
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
@@ -59,9 +61,13 @@ impl QuasiDefinite {
             }
             None => SymmetricOrdering::Amd,
         };
-        let symbolic =
-            factorize_symbolic_cholesky(pattern, Side::Lower, ordering, Default::default())
-                .map_err(|e| Error::LinearSolver(format!("{e:?}")))?;
+        // Small fill must not lead to factors entry by entry, which take twice the time of a step.
+        let parameters = CholeskySymbolicParams {
+            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
+            ..CholeskySymbolicParams::default()
+        };
+        let symbolic = factorize_symbolic_cholesky(pattern, Side::Lower, ordering, parameters)
+            .map_err(|e| Error::LinearSolver(format!("{e:?}")))?;
         let need = symbolic
             .factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default())
             .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
