@@ -205,8 +205,8 @@ fn deposits_converge_with_the_grid() {
 
 /// Run-out of columns of glass beads (Jop, Forterre & Pouliquen 2006: tan 20.9°, tan 32.76°, I_0 =
 /// 0.279; d = 1.15 mm = L/87) against the bands of the experiments of Lube et al. and Lajeunesse et al., as
-/// Lagrée, Staron & Popinet (2011, eq. 3.1) state their laws. The channel of Lajeunesse et al. is
-/// 45 mm wide; its walls rub with tan 10.4° (Jop et al. 2005, glass beads on glass). Negative control:
+/// Lagrée, Staron & Popinet (2011, eq. 3.1) state their laws. The experiments were made in channels: one 45 mm wide whose
+/// walls rub with tan 10.4° (glass beads on glass) is assumed for all of them. Negative control:
 /// with μ_s = 2 every band refuses the run.
 #[test]
 #[ignore = "long: run by tests/validate.sh"]
