@@ -27,6 +27,9 @@ use gmres::Gmres;
 use ldlt::QuasiDefinite;
 use lu::Lu;
 
+/// Relative residual from which on factors in single precision are enough.
+pub(crate) const LOOSE: f64 = 1e-6;
+
 /// How systems are solved.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub enum Method {
@@ -107,6 +110,7 @@ impl SparseSystem {
                     regularisation,
                     diagonal_slots,
                     places.map(|places| dissect(places, definite)),
+                    tolerance >= LOOSE,
                 )?;
                 system.iterative = Some((preconditioner, Gmres::new(size, tolerance)));
             }

@@ -2,9 +2,10 @@
 //! quasi-definite matrices have such factors in any order (Vanderbei, *SIAM J. Optim.* 5 (1995) 100).
 //! The order is nested dissection where places on a grid are known and minimum degree elsewhere.
 //!
-//! Factors are computed in double precision and kept rounded to single: substitution, which takes most of
-//! the time of a preconditioned iteration, is bound by the memory it reads. Rounding errs by 6e-8/δ of
-//! the pressure terms, far below what the iteration has to mend anyway as long as δ ≥ 1e-6.
+//! Factors are computed in double precision. Where the iteration may be loose they are kept rounded to single:
+//! substitution, which takes most of its time, is bound by the memory it reads. Rounding errs by 6e-8/δ of
+//! the pressure terms, far below what a loose iteration has to mend anyway as long as δ ≥ 1e-6; with viscosities
+//! that differ by 1e8 a tight one would not come to its end.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
 use faer::linalg::cholesky::ldlt::factor::LdltRegularization;
@@ -25,7 +26,8 @@ use crate::error::Error;
 pub(super) struct QuasiDefinite {
     symbolic: SymbolicCholesky<usize>,
     factors: Vec<f64>,
-    rounded: Vec<f32>,
+    /// The factors in single precision, where they are used so.
+    rounded: Option<Vec<f32>>,
     values: Vec<f64>,
     diagonal: Vec<u32>,
     signs: Vec<i8>,
@@ -47,6 +49,7 @@ impl QuasiDefinite {
         regularisation: f64,
         diagonal: Vec<u32>,
         order: Option<Vec<usize>>,
+        loose: bool,
     ) -> Result<Self, Error> {
         let order = order.map(|forward| {
             let mut back = vec![0; forward.len()];
@@ -61,11 +64,11 @@ impl QuasiDefinite {
             }
             None => SymmetricOrdering::Amd,
         };
-        // Small fill must not lead to factors entry by entry, which take twice the time of a step.
-        let parameters = CholeskySymbolicParams {
-            supernodal_flop_ratio_threshold: SupernodalThreshold::FORCE_SUPERNODAL,
-            ..CholeskySymbolicParams::default()
-        };
+        let mut parameters = CholeskySymbolicParams::default();
+        if loose {
+            // Small fill must not lead to factors entry by entry, which take twice the time of a step.
+            parameters.supernodal_flop_ratio_threshold = SupernodalThreshold::FORCE_SUPERNODAL;
+        }
         let symbolic = factorize_symbolic_cholesky(pattern, Side::Lower, ordering, parameters)
             .map_err(|e| Error::LinearSolver(format!("{e:?}")))?;
         let need = symbolic
@@ -75,7 +78,7 @@ impl QuasiDefinite {
             .map_err(|_| Error::LinearSolver("out of memory".to_owned()))?;
         Ok(Self {
             factors: vec![0.0; symbolic.len_val()],
-            rounded: Vec::new(),
+            rounded: loose.then(Vec::new),
             symbolic,
             values: vec![0.0; pattern.row_idx().len()],
             signs: (0..diagonal.len())
@@ -114,21 +117,23 @@ impl QuasiDefinite {
                 Default::default(),
             )
             .map_err(|e| Error::LinearSolver(format!("{e:?}")))?;
-        self.rounded.clear();
-        self.rounded.extend(self.factors.iter().map(|f| *f as f32));
+        if let Some(rounded) = &mut self.rounded {
+            rounded.clear();
+            rounded.extend(self.factors.iter().map(|f| *f as f32));
+        }
         Ok(())
     }
 
     /// Overwrites x with S⁻¹ x; there must be factors.
     pub(super) fn solve(&mut self, x: &mut [f64]) {
-        if let (SymbolicCholeskyRaw::Supernodal(supernodes), Some(order)) =
-            (self.symbolic.raw(), self.symbolic.perm())
+        if let (SymbolicCholeskyRaw::Supernodal(supernodes), Some(order), Some(rounded)) =
+            (self.symbolic.raw(), self.symbolic.perm(), &self.rounded)
         {
             let (forward, _) = order.arrays();
             for (y, &from) in self.ordered.iter_mut().zip(forward) {
                 *y = x[from];
             }
-            substitute(supernodes, &self.rounded, &mut self.ordered, &mut self.work);
+            substitute(supernodes, rounded, &mut self.ordered, &mut self.work);
             for (y, &to) in self.ordered.iter().zip(forward) {
                 x[to] = *y;
             }

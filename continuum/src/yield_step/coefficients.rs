@@ -5,7 +5,7 @@
 use crate::discretisation::{COMPONENTS, Discretisation};
 use crate::error::Error;
 use crate::grid::Axis;
-use crate::linear_solver::{Method, SparseSystem};
+use crate::linear_solver::{LOOSE, Method, SparseSystem};
 
 /// Most coefficients that a quadrature point adds, and a few for the divergence.
 const MOST_PAIRS: usize = 64;
@@ -113,6 +113,8 @@ impl StepMatrix {
 /// largest viscosity where matter flows, large enough for factors without pivoting that are kept in
 /// single precision. Collapses need 12.4, 10.3, 11.5 and 20 iterations at 1e-6, 1e-5, 1e-4 and 1e-3.
 const PRESSURE_REGULARISATION: f64 = 1e-5;
+/// The same for factors that are kept in double precision.
+const SMALL_REGULARISATION: f64 = 1e-8;
 
 /// Flows along one axis have narrow bands and are solved directly.
 fn method_for(discretisation: &Discretisation, tolerance: f64) -> Method {
@@ -120,9 +122,14 @@ fn method_for(discretisation: &Discretisation, tolerance: f64) -> Method {
     if grid.axes().contains(&Axis::Flat) {
         Method::Direct
     } else {
+        let share = if tolerance < LOOSE {
+            SMALL_REGULARISATION
+        } else {
+            PRESSURE_REGULARISATION
+        };
         Method::Preconditioned {
             definite: discretisation.velocities(),
-            regularisation: PRESSURE_REGULARISATION * grid.cell_volume(),
+            regularisation: share * grid.cell_volume(),
             tolerance,
         }
     }
