@@ -1,7 +1,8 @@
 #!/bin/sh
 # The long forms of the tests across crates, of the continuum and of the overlap: bulk laws with several seeds and sizes,
 # collapses and dam breaks on several grids, optimised.
-# Prints what they measure; half an hour on a quiet core, more on a busy one. A name as argument runs only the
+# Prints what they measure; how long all of it takes on a quiet machine was not measured (the run-out of columns alone: 18
+# minutes on a busy one). A name as argument runs only the
 # tests that hold it.
 set -eu
 cd "$(dirname "$0")/.."
