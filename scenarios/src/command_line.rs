@@ -1,7 +1,8 @@
 //! The command line: what `colluvium` understands, and what each command does.
 
+use crate::averages::{Choice, Where};
 use crate::calibrate;
-use crate::coarse_grain::{self, Where};
+use crate::coarse_grain;
 use crate::failure::Failure;
 use crate::grain_files::Unsaid;
 use crate::pareto;
@@ -262,24 +263,26 @@ impl CoarseGrainArguments {
                 timestep: self.timestep,
                 fixed_types: self.fixed_type.clone(),
             },
-            shape: match self.kernel.as_str() {
-                "gauss" => Shape::Gauss,
-                "heaviside" => Shape::Heaviside,
-                "polynomial" => Shape::Polynomial,
-                _ => Shape::Lucy,
+            choice: Choice {
+                shape: match self.kernel.as_str() {
+                    "gauss" => Shape::Gauss,
+                    "heaviside" => Shape::Heaviside,
+                    "polynomial" => Shape::Polynomial,
+                    _ => Shape::Lucy,
+                },
+                width: self.width,
+                place: match self.geometry.as_str() {
+                    "plane" => Where::Plane,
+                    "grid" => Where::Grid,
+                    "points" => Where::Points(points),
+                    "cylinder" => {
+                        Where::Cylinder(numbers("--axis", &self.axis)?, usize::from(self.angles))
+                    }
+                    _ => Where::Line,
+                },
+                cell: self.cell,
+                species: self.species_radii.clone(),
             },
-            width: self.width,
-            place: match self.geometry.as_str() {
-                "plane" => Where::Plane,
-                "grid" => Where::Grid,
-                "points" => Where::Points(points),
-                "cylinder" => {
-                    Where::Cylinder(numbers("--axis", &self.axis)?, usize::from(self.angles))
-                }
-                _ => Where::Line,
-            },
-            cell: self.cell,
-            species: self.species_radii.clone(),
             out: self.out.clone(),
         })
     }

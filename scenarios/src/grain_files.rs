@@ -7,7 +7,9 @@ mod legacy_vtk;
 mod series;
 
 use crate::failure::Failure;
-use colluvium_dem::{ContactSample, Domain, GrainSample, Partner, Snapshot};
+use colluvium_dem::{
+    BondSample, BondStress, ContactSample, Domain, GrainSample, Partner, Snapshot,
+};
 use nalgebra::Vector3;
 use std::collections::HashMap;
 use std::path::{Path, PathBuf};
@@ -59,6 +61,8 @@ struct Link {
     torques: Option<[Vector3<f64>; 2]>,
     /// From the centre of the first grain to the contact point (m), where the file knows it.
     arm: Option<Vector3<f64>>,
+    /// A bond of two grains, which is no contact of theirs.
+    bond: bool,
 }
 
 /// One instant of a file.
@@ -133,6 +137,7 @@ fn snapshot(instant: &Instant, unsaid: &Unsaid) -> Result<Snapshot, String> {
         });
     }
     let mut contacts = Vec::with_capacity(instant.links.len());
+    let mut bonds = Vec::new();
     for link in &instant.links {
         let find = |id: i64| {
             place
@@ -171,6 +176,18 @@ fn snapshot(instant: &Instant, unsaid: &Unsaid) -> Result<Snapshot, String> {
                 -branch * (other.radius / radii),
             ),
         };
+        if link.bond {
+            bonds.push(BondSample {
+                grains: [first, second],
+                force: link.force,
+                moment: link.torques.map_or_else(Vector3::zeros, |t| t[0]),
+                arm,
+                partner_arm,
+                radius: 0.0,
+                stress: BondStress::default(),
+            });
+            continue;
+        }
         let [torque, partner_torque] = link
             .torques
             .unwrap_or_else(|| [plain(arm, link.force), plain(partner_arm, -link.force)]);
@@ -192,7 +209,7 @@ fn snapshot(instant: &Instant, unsaid: &Unsaid) -> Result<Snapshot, String> {
         gravity: unsaid.gravity.into(),
         grains,
         contacts,
-        bonds: Vec::new(),
+        bonds,
         bodies: Vec::new(),
         body_contacts: Vec::new(),
     })

@@ -6,6 +6,7 @@
 //! [`pareto`] sets error against cost. Files are read and written in this crate only: the physics
 //! crates take and give plain data.
 
+pub mod averages;
 pub mod calibrate;
 pub mod checkpoint;
 pub mod coarse_grain;

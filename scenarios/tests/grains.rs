@@ -121,6 +121,73 @@ fn a_packing_is_made_once_and_used_by_name_or_file() {
     assert!(!at("bad").exists());
 }
 
+/// Start and end of a run in which bonds break, averaged while it goes on.
+const AVERAGED: [&str; 8] = [
+    "--set",
+    "timestep.seconds=1e-5",
+    "--set",
+    "output.frames=1",
+    "--set",
+    "output.average={geometry=\"plane\",every=0.05,width=0.003,cell=0.004,lower=[-0.03,-0.03,-0.01],upper=[0.03,0.03,0.06]}",
+    "--set",
+    "duration=0.05",
+];
+
+fn averaged<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+    run(out, &[&AVERAGED[..], more].concat())
+}
+
+/// Columns of a table by name.
+fn columns(path: &Path) -> Vec<(String, Vec<f64>)> {
+    let text = std::fs::read_to_string(path).unwrap();
+    let mut lines = text.lines();
+    let names = lines.next().unwrap().split(',');
+    let mut columns: Vec<_> = names.map(|n| (n.to_owned(), Vec::new())).collect();
+    for line in lines {
+        for (column, word) in columns.iter_mut().zip(line.split(',')) {
+            column.1.push(word.parse().unwrap());
+        }
+    }
+    columns
+}
+
+#[test]
+fn fields_gathered_on_the_way_are_those_of_the_files() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    succeed(folder.path(), &averaged("live", &["--threads", "2"]));
+    let words = "coarse-grain --box=-0.03,0.03,-0.03,0.03,-0.01,0.06 --geometry plane --width 0.003 --cell 0.004 \
+                 --gravity 0,0,-9.81 --out after live/grains.vtkhdf";
+    succeed(folder.path(), &words.split_whitespace().collect::<Vec<_>>());
+    let (live, after) = (
+        columns(&at("live").join("fields.csv")),
+        columns(&at("after").join("fields.csv")),
+    );
+    assert_eq!(live.len(), after.len());
+    for ((name, live), (other, after)) in live.iter().zip(&after) {
+        assert_eq!(name, other);
+        let size = live.iter().fold(0.0, |a: f64, x| a.max(x.abs()));
+        for (x, y) in live.iter().zip(after) {
+            assert!((x - y).abs() <= 1e-9 * size, "{name}: {x} {y}");
+        }
+    }
+    let sum = |name: &str| -> f64 {
+        let column = live.iter().find(|c| c.0 == name).unwrap();
+        column.1.iter().sum()
+    };
+    // Something moves, pushes and is bonded.
+    assert!(sum("density") > 0.0 && sum("sc_zz") < 0.0 && sum("coordination") > 0.0);
+
+    // Stopped on the way: the instant at the start is in the checkpoint.
+    let words = averaged("stopped", &["--threads", "1"]);
+    kill(folder.path(), &words, "stopped", "-INT", "packing:");
+    assert!(at("stopped").join("checkpoint.h5").exists());
+    let again = averaged("stopped", &["--resume", "--threads", "1"]);
+    succeed(folder.path(), &again);
+    let bytes = |out: &str| std::fs::read(at(out).join("fields.csv")).unwrap();
+    assert_eq!(bytes("stopped"), bytes("live"));
+}
+
 #[test]
 fn what_is_wrong_with_a_section_is_said_with_its_key() {
     let folder = tempfile::tempdir().unwrap();
@@ -184,6 +251,22 @@ fn what_is_wrong_with_a_section_is_said_with_its_key() {
         (
             "gravity.schedule=[[0,0,0,-1],[0,0,0,-2]]",
             &["gravity.schedule[1].time"],
+        ),
+        (
+            "output.average={geometry=\"plane\",every=0.0}",
+            &["output.average.every", "0"],
+        ),
+        (
+            "output.average={geometry=\"points\",every=0.01}",
+            &["output.average.points", "missing"],
+        ),
+        (
+            "output.average={geometry=\"line\",every=0.01,axis=[0,0]}",
+            &["output.average.axis"],
+        ),
+        (
+            "output.average={geometry=\"line\",every=0.01,from=0.2,to=0.1}",
+            &["output.average.to", "0.1"],
         ),
         ("gravity.file=none.csv", &["gravity.file", "none.csv", "gx"]),
         (

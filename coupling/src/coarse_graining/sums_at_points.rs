@@ -111,6 +111,38 @@ impl PointSums {
         self.species
     }
 
+    /// Adds the sums of others at the same points.
+    ///
+    /// # Panics
+    /// If they are of other points or species.
+    pub fn join(&mut self, other: &PointSums) {
+        assert_eq!(self.sums.len(), other.sums.len(), "sums at other points");
+        if other.samples > 0 {
+            self.averaged_extent = other.averaged_extent;
+        }
+        self.samples += other.samples;
+        for (sum, more) in self.sums.iter_mut().zip(&other.sums) {
+            *sum += more;
+        }
+    }
+
+    /// All numbers that change, for [`PointSums::set_numbers`].
+    pub fn numbers(&self) -> Vec<f64> {
+        let mut numbers = vec![self.samples as f64, self.averaged_extent];
+        numbers.extend(&self.sums);
+        numbers
+    }
+
+    /// Takes the numbers of sums at the same points.
+    ///
+    /// # Panics
+    /// If there are not as many.
+    pub fn set_numbers(&mut self, numbers: &[f64]) {
+        self.samples = numbers[0] as u64;
+        self.averaged_extent = numbers[1];
+        self.sums.copy_from_slice(&numbers[2..]);
+    }
+
     /// Adds a snapshot; free grains only, fixed ones are wall. A grain whose species is out of range counts with
     /// the last one. Blocks of points are shared over the threads of the rayon pool; the bits do not depend on it.
     ///

@@ -256,6 +256,7 @@ fn links(table: &Table, unsaid: &Unsaid) -> Result<Vec<Link>, String> {
                     [torque, torque]
                 }),
                 arm: None,
+                bond: false,
             }
         })
         .filter(|link| link.force.iter().all(|x| x.is_finite()))

@@ -78,16 +78,21 @@ fn rows(frame: &Frame) -> Result<Vec<Row>, String> {
         .collect())
 }
 
+/// `kind` of a bond in a series of contacts.
+const BOND: i64 = 2;
+
 fn links(frame: &Frame) -> Result<Vec<Link>, String> {
     let (first, second) = (counts(frame, "first")?, counts(frame, "second")?);
     let (force, point) = (vectors(frame, "force")?, vectors(frame, "arm")?);
     let (torque, other) = (vectors(frame, "torque")?, vectors(frame, "other_torque")?);
+    let kind = counts(frame, "kind")?;
     Ok((0..first.len())
         .map(|k| Link {
             ids: [first[k], second[k]],
             force: force[k].into(),
             torques: Some([Vector3::from(torque[k]), Vector3::from(other[k])]),
             arm: Some(point[k].into()),
+            bond: kind[k] == BOND,
         })
         .collect())
 }

@@ -12,6 +12,7 @@ pub mod build;
 pub mod course;
 pub mod fragments;
 pub mod history;
+pub mod live_averages;
 pub mod packing_file;
 pub mod pictures;
 pub mod recipe;

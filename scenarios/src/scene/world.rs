@@ -4,6 +4,7 @@
 //! A file for each section, with the keys as users write them and the way to the engine's own types. A
 //! scene takes the sections it needs into its struct; `grains` takes all of them.
 
+mod averages;
 mod bonds;
 mod boundaries;
 mod gravity;
@@ -15,6 +16,7 @@ mod region;
 mod sizes;
 mod walls;
 
+pub use averages::{AverageKeys, GeometryKind, KernelKind};
 pub use bonds::{BondKeys, CrackKeys, bond_rules};
 pub use boundaries::{BoundaryKeys, BoxMotionKeys, BoxMotionKind, OutletKeys};
 pub use gravity::{GravityKeys, HeavySphereKeys, SelfGravityKeys};

@@ -2,6 +2,7 @@
 
 use super::build::Stand;
 use super::history::History;
+use super::live_averages::LiveAverages;
 use super::packing_file::{self, Stored};
 use super::pictures::Pictures;
 use super::recipe::{Course, Recipe};
@@ -14,7 +15,7 @@ use crate::progress::Bar;
 use crate::run::{Findings, Under, bed, grain_table, step};
 use crate::run_directory;
 use crate::scene::Scene;
-use crate::scene::world::Materials;
+use crate::scene::world::{Materials, Place};
 use crate::summary::{Model, Quantity, Summary};
 use crate::table::Table;
 use colluvium_dem::preparation::{Coordination, HELD_BY_FRICTION, Packing, RestMeasures};
@@ -53,6 +54,13 @@ pub fn check(scene: &Scene, recipe: &dyn Recipe) -> Result<(), Failure> {
     let found = store::find(recipe, &materials, origin)?;
     let packing = found.map_or_else(|| trial(&materials), |stored| stored.packing);
     let stand = Stand::new(recipe, &packing, &materials, Threads::Serial, origin)?;
+    // Lengths and cells depend on the grains, which are not there yet; keys do not.
+    if let Some(average) = &recipe.output().average {
+        average.choice(Place {
+            origin,
+            section: "output.average",
+        })?;
+    }
     let trial = stand.start();
     trial
         .map(drop)
@@ -146,12 +154,16 @@ pub fn run(recipe: &dyn Recipe, under: &mut Under) -> Result<Findings, Failure> 
     let stand = Stand::new(recipe, &stored.packing, &materials, threads, &origin)?;
     let refused = |error: SetupError| Failure::Input(format!("{origin}: {error}"));
     let mut history = History::new(&stand.world, recipe);
+    let mut averages = LiveAverages::new(recipe, &stand, &origin)?;
     let mut state = Vec::new();
     let mut simulation = match &under.resumed {
         Some(saved) => {
             let damaged =
                 |why: String| Failure::Input(format!("--resume: the checkpoint is damaged: {why}"));
             history.restore(&saved.record).map_err(damaged)?;
+            if let Some(averages) = &mut averages {
+                averages.restore(&saved.record).map_err(damaged)?;
+            }
             state = saved.record.numbers(STATE).map_err(damaged)?.to_vec();
             stand.resume(&saved.record).map_err(refused)?
         }
@@ -176,6 +188,7 @@ pub fn run(recipe: &dyn Recipe, under: &mut Under) -> Result<Findings, Failure> 
             simulation: &mut simulation,
             history: &mut history,
             state: &mut state,
+            averages: averages.as_mut(),
             pictures: &pictures,
         },
         under,
@@ -193,7 +206,13 @@ pub fn run(recipe: &dyn Recipe, under: &mut Under) -> Result<Findings, Failure> 
     let seconds = clock.elapsed().as_secs_f64();
     let note = format!("{} steps in {seconds:.1} s", ran.simulation.steps_done());
     under.directory.journal.note(&note);
-    findings(recipe, (&stored, &mut ran), &pictures, under)
+    let fields = match &averages {
+        Some(averages) => averages.conclude(under.directory.path())?,
+        None => Vec::new(),
+    };
+    let mut found = findings(recipe, (&stored, &mut ran), &pictures, under)?;
+    found.tables.extend(fields);
+    Ok(found)
 }
 
 /// What a run takes along from step to step.
@@ -203,6 +222,7 @@ struct Followed<'a> {
     simulation: &'a mut Simulation,
     history: &'a mut History,
     state: &'a mut Vec<f64>,
+    averages: Option<&'a mut LiveAverages>,
     pictures: &'a Pictures<'a>,
 }
 
@@ -214,6 +234,7 @@ fn follow(run: Followed, under: &mut Under) -> Result<(), Failure> {
         simulation,
         history,
         state,
+        mut averages,
         pictures,
     } = run;
     let steps = stand.steps;
@@ -227,6 +248,9 @@ fn follow(run: Followed, under: &mut Under) -> Result<(), Failure> {
         course = recipe.steer(simulation, state)?;
         history.look(recipe, simulation, &mut seen, state);
         frames.take(simulation, &mut seen)?;
+        if let Some(averages) = &mut averages {
+            averages.take(simulation, &mut seen)?;
+        }
         pictures.take(simulation, 0, steps)?;
     }
     while simulation.steps_done() < steps && course == Course::On {
@@ -236,6 +260,9 @@ fn follow(run: Followed, under: &mut Under) -> Result<(), Failure> {
         next = next.min(done + STEPS_PER_LOOK);
         next = frames.next(done).map_or(next, |frame| frame.min(next));
         next = next.min(pictures.next(done, steps));
+        if let Some(look) = averages.as_ref().and_then(|a| a.next(done)) {
+            next = next.min(look);
+        }
         simulation
             .advance(next - done)
             .map_err(|error| Failure::Run(error.to_string()))?;
@@ -246,10 +273,15 @@ fn follow(run: Followed, under: &mut Under) -> Result<(), Failure> {
             history.look(recipe, simulation, &mut seen, state);
         }
         frames.take(simulation, &mut seen)?;
+        if let Some(averages) = &mut averages {
+            averages.take(simulation, &mut seen)?;
+        }
         pictures.take(simulation, next, steps)?;
         bar.set(next as f64 / steps as f64);
         if course == Course::On {
-            under.checkpoint("steps", || saved(simulation, history, state))?;
+            under.checkpoint("steps", || {
+                saved(simulation, history, averages.as_deref(), state)
+            })?;
         }
     }
     bar.clear();
@@ -259,9 +291,17 @@ fn follow(run: Followed, under: &mut Under) -> Result<(), Failure> {
     frames.join(done)
 }
 
-fn saved(simulation: &mut Simulation, history: &History, state: &[f64]) -> Record {
+fn saved(
+    simulation: &mut Simulation,
+    history: &History,
+    averages: Option<&LiveAverages>,
+    state: &[f64],
+) -> Record {
     let mut record = simulation.checkpoint();
     history.save(&mut record);
+    if let Some(averages) = averages {
+        averages.save(&mut record);
+    }
     record.numbers.insert(STATE.into(), state.to_vec());
     record
 }

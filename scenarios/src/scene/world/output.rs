@@ -1,5 +1,6 @@
 //! `[output]` and `[timestep]`.
 
+use super::AverageKeys;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -18,6 +19,9 @@ pub struct OutputKeys {
     pub pictures: u64,
     /// Whether rows also hold work and heat by channel of the contacts.
     pub ledger: bool,
+    /// Coarse-grained fields, gathered as the run goes on: `fields.csv` and `fields.vtkhdf`. Left out: none.
+    #[serde(skip_serializing_if = "Option::is_none")]
+    pub average: Option<AverageKeys>,
 }
 
 impl Default for OutputKeys {
@@ -27,6 +31,7 @@ impl Default for OutputKeys {
             frames: 0,
             pictures: 1,
             ledger: false,
+            average: None,
         }
     }
 }
