@@ -54,7 +54,7 @@ fn hanging(threads: Threads) -> Setup {
 
 /// Every fifth chain parts below its second grain.
 fn crack(simulation: &mut Simulation) -> usize {
-    let parts = |g: &GrainSample| (g.id % 4 == 2 && (g.id / 4) % 5 == 0).then_some(1);
+    let parts = |g: &GrainSample| (g.id % 4 == 2 && (g.id / 4).is_multiple_of(5)).then_some(1);
     simulation.convert(parts).unwrap()
 }
 
@@ -71,7 +71,7 @@ fn grains_without_cohesion_let_go() {
     let fall = 0.5 * 1e-4 * time * time;
     for (k, (now, then)) in simulation.grain_list().iter().zip(&before).enumerate() {
         let sunk = then.position.z - now.position.z;
-        let loose = k % 4 >= 2 && (k / 4) % 5 == 0;
+        let loose = k % 4 >= 2 && (k / 4).is_multiple_of(5);
         // What the attraction had pressed into each other springs apart, at 5e-4 m/s.
         let exact = if loose { fall } else { 0.0 };
         assert!((sunk - exact).abs() < 0.12 * fall, "{k}: {sunk} {exact}");
