@@ -43,6 +43,7 @@ pub fn case(scene: &CollapseScene) -> CollapseCase {
         rheology: scene.rheology.mu_i(),
         cells: scene.cells(),
         length_scaled: scene.grid.length_scaled,
+        overhang_degrees: 0.0,
     }
 }
 
