@@ -157,6 +157,34 @@ fn column_of_grains_stands_beside_its_continuum() {
     assert!(control["results"].get("continuum_runout_scaled").is_none());
 }
 
+/// A cliff of grains seven across whose face leans out, and the same of a continuum: both fall at once, over the lip.
+#[test]
+fn dry_cliff_falls_without_its_support() {
+    let folder = tempfile::tempdir().unwrap();
+    let lip = 30.0 * (1.0 + 10f64.to_radians().tan());
+    let run = |out: &str, sets: &[&str]| {
+        let mut list = vec!["run", "cliff-plain", "--out", out];
+        for set in ["output.pictures=0", "grains.calibrated=none"]
+            .iter()
+            .chain(sets)
+        {
+            list.extend(["--set", set]);
+        }
+        succeed(folder.path(), &list);
+        let (_, fronts) = table(&folder.path().join(out).join("front.csv"));
+        let found = summary(&folder.path().join(out));
+        (fronts[0][1], value(&found, "runout_scaled"))
+    };
+    let grains = ["grains.diameter=4.2", "grains.width_diameters=4"];
+    let (start, of_grains) = run("g", &grains);
+    assert!((start - lip).abs() < 6.0, "{start} {lip}");
+    let (start, of_continuum) = run("c", &["model=continuum", "grid.cells=48"]);
+    assert!((start - lip).abs() < 2.0, "{start} {lip}");
+    for runout in [of_grains, of_continuum] {
+        assert!((0.8..2.5).contains(&runout), "{of_grains} {of_continuum}");
+    }
+}
+
 #[test]
 fn interrupted_column_of_grains_goes_on_to_the_same_state() {
     let sets = ["grains.calibrated=none", "output.pictures=0"];

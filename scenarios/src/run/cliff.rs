@@ -505,23 +505,9 @@ impl Recipe for CliffScene {
             &[("sunk", "sunk on the mean"), ("x_front", "front")],
             "How far what stood before the crack has sunk, and where the debris ends.",
         ));
-        let fronts = &record.heap.fronts;
-        let column = |k: usize| fronts.iter().map(|f| f[k]).collect();
-        let [times, positions, heights] = record.heap.profile_rows(&places);
-        Ok(vec![
-            Table::new("front")
-                .with("t", "s", column(0))
-                .with("x_front", "m", column(1))
-                .with("height", "m", column(2)),
-            Table::new("deposit")
-                .with("x", "m", places)
-                .with("h", "m", deposit),
-            Table::new("profiles")
-                .with("t", "s", times)
-                .with("x", "m", positions)
-                .with("h", "m", heights),
-            sizes,
-        ])
+        let mut tables = record.heap.tables(places, deposit);
+        tables.push(sizes);
+        Ok(tables)
     }
 
     fn compared(&self) -> Vec<&'static str> {

@@ -462,21 +462,7 @@ impl Recipe for CollapseScene {
                     / (ran.simulation.free_mass() * self.gravity * self.grains.diameter)
             ));
         }
-        let column = |k: usize| course.fronts.iter().map(|f| f[k]).collect();
-        let [times, positions, heights] = course.profile_rows(&places);
-        Ok(vec![
-            Table::new("front")
-                .with("t", "s", column(0))
-                .with("x_front", "m", column(1))
-                .with("height", "m", column(2)),
-            Table::new("deposit")
-                .with("x", "m", places)
-                .with("h", "m", deposit),
-            Table::new("profiles")
-                .with("t", "s", times)
-                .with("x", "m", positions)
-                .with("h", "m", heights),
-        ])
+        Ok(course.tables(places, deposit))
     }
 
     fn compared(&self) -> Vec<&'static str> {

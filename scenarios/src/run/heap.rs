@@ -7,6 +7,8 @@
 //! grains over x would have if they were packed as they were. It keeps the area: what an incompressible
 //! continuum has too.
 
+use crate::table::Table;
+
 /// Places at which heights are taken: the middles of columns side by side.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct HeapAxis {
@@ -107,15 +109,29 @@ impl HeapCourse {
         }
     }
 
-    /// Profiles as columns of a table: time, place, height.
-    pub fn profile_rows(&self, positions: &[f64]) -> [Vec<f64>; 3] {
+    /// What every heap writes: `front`, `deposit` and `profiles`, as the continuum's collapse does.
+    pub fn tables(&self, positions: Vec<f64>, deposit: Vec<f64>) -> Vec<Table> {
         let mut rows: [Vec<f64>; 3] = Default::default();
         for (time, heights) in &self.profiles {
             rows[0].extend(std::iter::repeat_n(*time, heights.len()));
-            rows[1].extend(positions);
+            rows[1].extend(&positions);
             rows[2].extend(heights);
         }
-        rows
+        let [times, places, heights] = rows;
+        let column = |k: usize| self.fronts.iter().map(|f| f[k]).collect();
+        vec![
+            Table::new("front")
+                .with("t", "s", column(0))
+                .with("x_front", "m", column(1))
+                .with("height", "m", column(2)),
+            Table::new("deposit")
+                .with("x", "m", positions)
+                .with("h", "m", deposit),
+            Table::new("profiles")
+                .with("t", "s", times)
+                .with("x", "m", places)
+                .with("h", "m", heights),
+        ]
     }
 }
 
