@@ -200,10 +200,9 @@ pub(crate) unsafe fn find<L: Lanes, I: Interaction>(
             };
             let mut near = r2.less(far * far);
             let springs = history.add(eight * I::HISTORY * WIDEST + first);
-            if I::HOLDS && L::lanes(near) != 0 {
-                // The last number of history is 1 on an established contact, which holds across a gap.
-                let established = L::read(springs.add((I::HISTORY - 1) * WIDEST));
-                let [_, _, _, curvature] = combine(field.rows.turn(), i, j, L::splat(1.0));
+            // Only pairs across a gap have to be asked whether they hold.
+            if I::HOLDS && L::lanes(near) != L::lanes(r2.less(reach * reach)) {
+                let memory = L::read(springs.add((I::HISTORY - 1) * WIDEST));
                 let mixed;
                 let coefficients = if law.materials() > 1 {
                     let (i, j) = (&pairs.i[place..][..L::WIDTH], &pairs.j[place..][..L::WIDTH]);
@@ -212,8 +211,7 @@ pub(crate) unsafe fn find<L: Lanes, I: Interaction>(
                 } else {
                     like
                 };
-                let held = law.hold(coefficients, curvature) * established;
-                let far = reach + L::select(zero.less(held), held, zero);
+                let far = reach + law.hold(coefficients, memory);
                 near = r2.less(far * far);
             }
             let bits = L::lanes(near);
@@ -249,7 +247,9 @@ pub(crate) unsafe fn find<L: Lanes, I: Interaction>(
     contacts.count = count;
     // The last batch is filled up with the dummy, a unit away from itself.
     for k in 0..APART + I::HISTORY {
-        let number = if k == 0 { 1.0 } else { 0.0 };
+        // It remembers something, or the law would have to find out what.
+        let remembers = I::HOLDS && k == APART + I::HISTORY - 1;
+        let number = if k == 0 || remembers { 1.0 } else { 0.0 };
         // SAFETY: there is room for a batch behind the last contact.
         unsafe { L::splat(number).write(columns.add(k * room + count)) };
     }

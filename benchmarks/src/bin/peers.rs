@@ -15,7 +15,8 @@ use std::process::ExitCode;
 struct CommandLine {
     #[command(subcommand)]
     worker: Option<Worker>,
-    /// chute, settled or settle; may be repeated.
+    /// chute, settled, settle or settled-LAW (hooke, viscoelastic, epsd, shape, cohesion, dmt, mixed, jkr); may
+    /// be repeated.
     #[arg(long = "case", default_values_t = ["chute".to_owned(), "settled".to_owned()])]
     cases: Vec<String>,
     /// How often every code runs.

@@ -1,36 +1,9 @@
 //! One description of each comparison: every code's deck and start state are written from it.
 
+use super::law::{Cohesion, Law, Rolling};
 use colluvium_dem::Grain;
 use colluvium_tests::{chute_start, settle_start, settled_start};
 use serde::Serialize;
-
-/// The contact law every code is asked for, in physical terms.
-#[derive(Clone, Copy, Debug, PartialEq, Serialize)]
-#[serde(tag = "kind", rename_all = "kebab-case")]
-pub enum Law {
-    /// Linear springs; normal dashpot of `damping` × reduced mass, no tangential one.
-    Hooke {
-        /// k_n (N/m).
-        stiffness: f64,
-        /// k_t (N/m).
-        tangential: f64,
-        /// γ_n (1/s).
-        damping: f64,
-        /// Coulomb coefficient.
-        friction: f64,
-    },
-    /// Hertz and Mindlin with history, dashpots from the restitution.
-    HertzMindlin {
-        /// Young's modulus (Pa).
-        young: f64,
-        /// Poisson's ratio.
-        poisson: f64,
-        /// Normal restitution.
-        restitution: f64,
-        /// Coulomb coefficient.
-        friction: f64,
-    },
-}
 
 /// A resting plane across one axis.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize)]
@@ -91,6 +64,12 @@ pub struct Case {
     pub skin: f64,
     /// Contact law.
     pub law: Law,
+    /// Resistance to rolling and twisting.
+    pub rolling: Rolling,
+    /// Attraction of touching grains.
+    pub cohesion: Cohesion,
+    /// Our own side takes the grains for two materials in turns, of the same law each.
+    pub two_materials: bool,
     /// Walls.
     pub walls: Vec<Wall>,
     /// Steps before the clock starts.
@@ -110,7 +89,19 @@ pub struct Case {
 }
 
 /// Names of all cases.
-pub const CASES: [&str; 3] = ["chute", "settled", "settle"];
+pub const CASES: [&str; 11] = [
+    "chute",
+    "settled",
+    "settle",
+    "settled-hooke",
+    "settled-viscoelastic",
+    "settled-epsd",
+    "settled-shape",
+    "settled-cohesion",
+    "settled-dmt",
+    "settled-mixed",
+    "settled-jkr",
+];
 
 /// A case by its name.
 pub fn case(name: &str) -> Option<Case> {
@@ -118,7 +109,7 @@ pub fn case(name: &str) -> Option<Case> {
         "chute" => Some(chute()),
         "settled" => Some(settled()),
         "settle" => Some(settle()),
-        _ => None,
+        _ => settled_under(name),
     }
 }
 
@@ -158,6 +149,9 @@ fn chute() -> Case {
             damping: 50.0,
             friction: 0.5,
         },
+        rolling: Rolling::Free,
+        cohesion: Cohesion::None,
+        two_materials: false,
         walls: Vec::new(),
         warm_up: 200,
         steps: 800,
@@ -170,6 +164,10 @@ fn chute() -> Case {
         },
     }
 }
+
+/// Young's modulus (Pa) and Poisson's ratio of the settled bed.
+const YOUNG: f64 = 1e7;
+const POISSON: f64 = 0.3;
 
 fn settled() -> Case {
     let wall = |axis, position, grains_above| Wall {
@@ -187,11 +185,14 @@ fn settled() -> Case {
         timestep: 2e-5,
         skin: 1e-3,
         law: Law::HertzMindlin {
-            young: 1e7,
-            poisson: 0.3,
+            young: YOUNG,
+            poisson: POISSON,
             restitution: 0.5,
             friction: 0.5,
         },
+        rolling: Rolling::Free,
+        cohesion: Cohesion::None,
+        two_materials: false,
         walls: vec![
             wall(0, 0.0, true),
             wall(0, 0.1, false),
@@ -206,6 +207,97 @@ fn settled() -> Case {
         grains: settled_start(),
         reference: Reference::FinerStep(10),
     }
+}
+
+/// The settled bed under another law. It is laid under the law of `settled` and goes on under this one:
+/// what is compared is the cost of a law on one packing; the first steps are those of a bed that finds its
+/// balance anew.
+fn settled_under(name: &str) -> Option<Case> {
+    let bed = settled();
+    let epsd = Rolling::Epsd {
+        friction: 0.2,
+        damping_ratio: 0.3,
+    };
+    // Some five times the weight of a grain, with all of them.
+    let area = Cohesion::ContactArea { density: 4e4 };
+    let adhesion = 1.0;
+    Some(match name {
+        "settled-hooke" => Case {
+            name: "settled-hooke",
+            title: "10 000 spheres of 2.5 mm ± 20 % at rest in a box, linear springs",
+            law: Law::Hooke {
+                stiffness: 1500.0,
+                tangential: 1500.0 * 2.0 / 7.0,
+                damping: 500.0,
+                friction: 0.5,
+            },
+            ..bed
+        },
+        "settled-viscoelastic" => Case {
+            name: "settled-viscoelastic",
+            title: "10 000 spheres of 2.5 mm ± 20 % at rest in a box, viscous elastic spheres",
+            law: Law::Viscoelastic {
+                young: YOUNG,
+                poisson: POISSON,
+                dissipation: 1e-4,
+                friction: 0.5,
+            },
+            ..bed
+        },
+        "settled-epsd" => Case {
+            name: "settled-epsd",
+            title: "10 000 spheres of 2.5 mm ± 20 % at rest in a box, Hertz–Mindlin, EPSD rolling",
+            rolling: epsd,
+            ..bed
+        },
+        "settled-shape" => Case {
+            name: "settled-shape",
+            title: "10 000 spheres of 2.5 mm ± 20 % at rest in a box, Hertz–Mindlin, rolling and twisting springs",
+            rolling: Rolling::Shape {
+                beta: 0.2,
+                rolling_friction: 1.05,
+                twisting_friction: 1.3,
+            },
+            ..bed
+        },
+        "settled-cohesion" => Case {
+            name: "settled-cohesion",
+            title: "10 000 spheres of 2.5 mm ± 20 % at rest in a box, Hertz–Mindlin, EPSD rolling, cohesion on the contact area",
+            rolling: epsd,
+            cohesion: area,
+            ..bed
+        },
+        "settled-dmt" => Case {
+            name: "settled-dmt",
+            title: "10 000 spheres of 2.5 mm ± 20 % at rest in a box, Hertz–Mindlin, EPSD rolling, DMT cohesion",
+            rolling: epsd,
+            cohesion: Cohesion::Dmt {
+                work_of_adhesion: adhesion,
+            },
+            ..bed
+        },
+        "settled-mixed" => Case {
+            name: "settled-mixed",
+            title: "10 000 spheres of 2.5 mm ± 20 % at rest in a box, Hertz–Mindlin, EPSD rolling, cohesion on the contact area, two materials in our own run",
+            rolling: epsd,
+            cohesion: area,
+            two_materials: true,
+            ..bed
+        },
+        "settled-jkr" => Case {
+            name: "settled-jkr",
+            title: "10 000 spheres of 2.5 mm ± 20 % at rest in a box, JKR with sliding, rolling and twisting",
+            law: Law::Jkr {
+                young: YOUNG,
+                poisson: POISSON,
+                surface_energy: 0.5 * adhesion,
+                damping_rate: 500.0,
+                critical_rolling: 2.5e-5,
+            },
+            ..bed
+        },
+        _ => return None,
+    })
 }
 
 fn settle() -> Case {

@@ -1,52 +1,207 @@
 //! LAMMPS: its deck, and its log, which LIGGGHTS' is like.
 
-use super::case::{Case, Law, State, Wall};
+use super::case::{Case, State, Wall};
+use super::law::{Cohesion, Law, Rolling, moduli};
 use super::start_files::types;
 use super::trace::{Trace, finished};
+use colluvium_dem::{Elasticity, Jkr, ShapeParameter};
 use std::fmt::Write;
 
 /// Appends the process' time on a processor (ns) to `cpu.txt`: once before and once after the clock.
 pub const STAMP: &str = r#"shell "cat /proc/$PPID/schedstat >> cpu.txt""#;
 
 /// The law LAMMPS solves.
-pub fn law(case: &Case) -> &'static str {
-    match case.law {
-        Law::Hooke { .. } => {
+pub fn law(case: &Case) -> String {
+    let normal = match case.law {
+        Law::Hooke { .. } if case.walls.is_empty() => {
             "the case's: spring reset under sliding, radii as arms, pull at release kept"
+        }
+        Law::Hooke { .. } => "granular: hooke, linear_history, mass_velocity",
+        Law::HertzMindlin { .. } if matches!(case.cohesion, Cohesion::Dmt { .. }) => {
+            "granular: dmt, mindlin, viscoelastic with the dashpot of a typical contact"
         }
         Law::HertzMindlin { .. } => {
             "granular: hertz, mindlin, coeff_restitution; limited spring reset less the dashpot's share"
         }
+        Law::Viscoelastic { .. } => {
+            "granular: hertz, mindlin, viscoelastic with the reduced mass of the mean grain"
+        }
+        Law::Jkr { .. } => {
+            "granular: jkr, mindlin, mass_velocity, rolling sds, twisting sds; limits grow with the load"
+        }
+    };
+    let turning = match case.rolling {
+        Rolling::Free => "",
+        Rolling::Epsd { .. } => ", rolling sds with the stiffness of a typical contact",
+        Rolling::Shape { .. } => {
+            ", rolling and twisting sds with the stiffness of a typical contact"
+        }
+    };
+    let cohesion = match case.cohesion {
+        Cohesion::ContactArea { .. } => "; without cohesion: it has none on the contact area",
+        Cohesion::None | Cohesion::Dmt { .. } => "",
+    };
+    format!("{normal}{turning}{cohesion}")
+}
+
+/// Arguments of `pair granular` and `wall/gran granular`.
+///
+/// The tangential dashpot is the normal one times √(k_t/k_n) of the two tangent stiffnesses, 8 G* a and
+/// 2 E* a: the same relation of damping to stiffness along both directions. `sds` takes one stiffness for
+/// all contacts: that of [`Typical`].
+fn granular(case: &Case) -> String {
+    match case.law {
+        Law::Hooke {
+            stiffness,
+            tangential,
+            damping,
+            friction,
+        } => format!(
+            "hooke {stiffness} {damping} tangential linear_history {tangential} 0 {friction} damping mass_velocity"
+        ),
+        Law::HertzMindlin {
+            young,
+            poisson,
+            restitution,
+            friction,
+        } => {
+            let [e, g] = moduli(young, poisson);
+            let (normal, tangential, ratio) = (4.0 / 3.0 * e, 8.0 * g, (4.0 * g / e).sqrt());
+            let shear = format!("tangential mindlin {tangential} {ratio} {friction}");
+            let turning = turning(case, young, poisson);
+            match case.cohesion {
+                Cohesion::Dmt { work_of_adhesion } => {
+                    // It takes no restitution beside cohesion: the dashpot of a typical contact, with a ratio
+                    // of damping of -ln e/√(π² + ln² e), 5/6 of it for the tangent stiffness 2 E* a.
+                    let Typical { mass, contact, .. } = Typical::of(case, e);
+                    let log = restitution.ln();
+                    let ratio = (5.0_f64 / 6.0).sqrt() * -log / log.hypot(std::f64::consts::PI);
+                    let damping =
+                        2.0 * ratio * (2.0 * e * contact * mass).sqrt() / (contact * mass);
+                    // γ of LAMMPS is half the work of adhesion.
+                    let surface_energy = 0.5 * work_of_adhesion;
+                    format!(
+                        "dmt {young} {damping} {poisson} {surface_energy} {shear}{turning} damping viscoelastic"
+                    )
+                }
+                Cohesion::None | Cohesion::ContactArea { .. } => format!(
+                    "hertz {normal} {restitution} {shear}{turning} damping coeff_restitution"
+                ),
+            }
+        }
+        Law::Viscoelastic {
+            young,
+            poisson,
+            dissipation,
+            friction,
+        } => {
+            let [e, g] = moduli(young, poisson);
+            let typical = Typical::of(case, e);
+            let damping = 4.0 / 3.0 * dissipation * e / typical.mass;
+            format!(
+                "hertz {} {damping} tangential mindlin {} 1 {friction} damping viscoelastic",
+                4.0 / 3.0 * e,
+                8.0 * g
+            )
+        }
+        Law::Jkr {
+            young,
+            poisson,
+            surface_energy,
+            damping_rate,
+            critical_rolling,
+        } => {
+            let [e, g] = moduli(young, poisson);
+            let radius = Typical::of(case, e).radius;
+            let jkr = Jkr {
+                surface_energy,
+                elasticity: Elasticity {
+                    youngs_modulus: young,
+                    poissons_ratio: poisson,
+                },
+                damping_rate,
+                critical_rolling,
+            };
+            // Limits of sliding, rolling and twisting of a contact without load, over twice its pull-off force.
+            let load = 2.0 * jkr.pull_off_force(radius);
+            let slip = jkr.sliding_stiffness(radius) * jkr.critical_sliding(radius) / load;
+            let rolling = jkr.rolling_stiffness(radius) / radius.powi(2);
+            let twisting = jkr.twisting_stiffness(radius);
+            format!(
+                "jkr {young} {damping_rate} {poisson} {surface_energy} tangential mindlin {} 0 {slip} rolling sds {rolling} 0 {} twisting sds {twisting} 0 {} damping mass_velocity",
+                8.0 * g,
+                rolling * critical_rolling / load,
+                twisting / (16.0 * std::f64::consts::PI) / load,
+            )
+        }
     }
 }
 
-/// E*, G* of two equal materials.
-pub fn moduli(young: f64, poisson: f64) -> [f64; 2] {
-    [
-        young / (2.0 * (1.0 - poisson * poisson)),
-        young / (4.0 * (2.0 - poisson) * (1.0 + poisson)),
-    ]
+/// Words for rolling and twisting beside a Hertz contact.
+fn turning(case: &Case, young: f64, poisson: f64) -> String {
+    let [e, g] = moduli(young, poisson);
+    let Typical {
+        radius,
+        mass,
+        contact,
+    } = Typical::of(case, e);
+    let (normal, tangential) = (4.0 / 3.0 * e * contact, 8.0 * g * contact);
+    match case.rolling {
+        Rolling::Free => String::new(),
+        Rolling::Epsd {
+            friction,
+            damping_ratio,
+        } => {
+            // M = R F, F = k ξ + γ dξ/dt, ξ = R θ; of two equal grains of radius 2R and mass 2m.
+            let stiffness = 2.25 * normal * friction * friction;
+            let damping = 2.0 * damping_ratio * (stiffness * 1.4 * 4.0 * mass).sqrt();
+            format!(" rolling sds {stiffness} {damping} {friction}")
+        }
+        Rolling::Shape {
+            beta,
+            rolling_friction,
+            twisting_friction,
+        } => {
+            let shape = ShapeParameter {
+                beta,
+                rolling_friction,
+                twisting_friction,
+            };
+            let rolling = shape.rolling_stiffness(normal, radius) / radius.powi(2);
+            let twisting = shape.twisting_stiffness(tangential, radius);
+            format!(
+                " rolling sds {rolling} 0 {} twisting sds {twisting} 0 {}",
+                beta * rolling_friction,
+                beta * radius * twisting_friction
+            )
+        }
+    }
 }
 
-/// Arguments of `pair granular` and `wall/gran granular` for Hertz–Mindlin.
-///
-/// The tangential dashpot is the normal one times √(k_t/k_n) of the two tangent stiffnesses, 8 G* a and
-/// 2 E* a: the same relation of damping to stiffness along both directions.
-fn granular(law: &Law) -> Option<String> {
-    let Law::HertzMindlin {
-        young,
-        poisson,
-        restitution,
-        friction,
-    } = *law
-    else {
-        return None;
-    };
-    let [e, g] = moduli(young, poisson);
-    let (normal, tangential, ratio) = (4.0 / 3.0 * e, 8.0 * g, (4.0 * g / e).sqrt());
-    Some(format!(
-        "hertz {normal} {restitution} tangential mindlin {tangential} {ratio} {friction} damping coeff_restitution"
-    ))
+/// A contact of two mean grains of a case.
+struct Typical {
+    /// Reduced radius (m).
+    radius: f64,
+    /// Reduced mass (kg).
+    mass: f64,
+    /// Radius of the contact (m) under the weight of ten grains.
+    contact: f64,
+}
+
+impl Typical {
+    fn of(case: &Case, modulus: f64) -> Typical {
+        let n = case.grains.len() as f64;
+        let mean = case.grains.iter().map(|g| g.radius).sum::<f64>() / n;
+        let density = case.grains[0].density;
+        let mass = 4.0 / 3.0 * std::f64::consts::PI * mean.powi(3) * density;
+        let gravity = case.gravity.iter().map(|g| g * g).sum::<f64>().sqrt();
+        let radius = 0.5 * mean;
+        Typical {
+            radius,
+            mass: 0.5 * mass,
+            contact: (0.75 * 10.0 * mass * gravity * radius / modulus).cbrt(),
+        }
+    }
 }
 
 /// The deck; it reads `start.data` in the folder it runs in.
@@ -56,33 +211,26 @@ pub fn deck(case: &Case) -> String {
     let _ = writeln!(
         d,
         "units {}",
-        if matches!(case.law, Law::Hooke { .. }) {
-            "lj"
-        } else {
-            "si"
-        }
+        if case.walls.is_empty() { "lj" } else { "si" }
     );
     d.push_str("atom_style sphere\n");
     let _ = writeln!(d, "boundary {}", boundary(case));
     // Grains in motion have their neighbours' velocities at hand; pairs across ranks are done by both.
     d.push_str("newton off\ncomm_modify vel yes\nprocessors * * 1\nread_data start.data\n");
-    match (&case.law, granular(&case.law)) {
-        (
-            Law::Hooke {
-                stiffness,
-                tangential,
-                damping,
-                friction,
-            },
-            _,
-        ) => {
+    match case.law {
+        Law::Hooke {
+            stiffness,
+            tangential,
+            damping,
+            friction,
+        } if case.walls.is_empty() => {
             let _ = writeln!(
                 d,
                 "pair_style gran/hooke/history {stiffness} {tangential} {damping} 0 {friction} 0\npair_coeff * *"
             );
         }
-        (_, model) => {
-            let model = model.unwrap_or_default();
+        _ => {
+            let model = granular(case);
             let _ = writeln!(d, "pair_style granular\npair_coeff * * {model}");
             for (k, wall) in case.walls.iter().enumerate() {
                 let [low, high] = sides(wall);
@@ -282,8 +430,23 @@ Total wall time: 0:00:07
     }
 
     #[test]
-    fn moduli_are_those_of_two_equal_bodies() {
-        let [e, g] = moduli(1e7, 0.3);
-        assert!((e - 1e7 / 1.82).abs() < 1e-6 && (g - 1e7 / 8.84).abs() < 1e-6);
+    fn every_law_has_its_words() {
+        let pair = |name: &str| {
+            let deck = deck(&case(name).unwrap());
+            let pair = deck.lines().find(|l| l.starts_with("pair_coeff")).unwrap();
+            assert_eq!(deck.matches("wall/gran granular").count(), 5, "{name}");
+            pair.trim_start_matches("pair_coeff * * ").to_owned()
+        };
+        assert!(pair("settled-hooke").starts_with("hooke 1500 500 tangential linear_history"));
+        assert!(pair("settled-viscoelastic").ends_with("damping viscoelastic"));
+        assert!(pair("settled-epsd").contains(" rolling sds "));
+        assert!(!pair("settled-epsd").contains("twisting"));
+        assert!(pair("settled-shape").contains(" twisting sds "));
+        assert!(
+            pair("settled-dmt").starts_with("dmt 10000000 ")
+                && pair("settled-dmt").contains(" 0.3 0.5 tangential")
+        );
+        assert!(pair("settled-jkr").starts_with("jkr 10000000 500 0.3 0.5 "));
+        assert!(law(&case("settled-cohesion").unwrap()).contains("without cohesion"));
     }
 }

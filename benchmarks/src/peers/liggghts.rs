@@ -1,17 +1,65 @@
 //! LIGGGHTS' deck. Its log is read as LAMMPS'.
 
-use super::case::{Case, Law};
+use super::case::Case;
 use super::lammps::{boundary, motion, schedule};
+use super::law::{Cohesion, Law, Rolling};
 use super::start_files::types;
 use std::fmt::Write;
 
-/// The law LIGGGHTS solves.
-pub fn law(case: &Case) -> &'static str {
-    match case.law {
+/// The law LIGGGHTS solves, or the nearest it has.
+pub fn law(case: &Case) -> String {
+    let normal = match case.law {
         Law::Hooke { .. } => {
             "hooke/stiffness, history, no tangential damping; arms to the contact point"
         }
         Law::HertzMindlin { .. } => "hertz, history; tangential dashpot beyond friction's limit",
+        Law::Viscoelastic { .. } => "nearest it has: hertz, history, dashpots of restitution 0.5",
+        Law::Jkr { .. } => "nearest it has: hertz, history, epsd, sjkr; no twisting",
+    };
+    let turning = match case.rolling {
+        Rolling::Free => "",
+        Rolling::Epsd { .. } => ", epsd",
+        Rolling::Shape { .. } => ", epsd as the nearest it has; no twisting",
+    };
+    let cohesion = match case.cohesion {
+        Cohesion::None => "",
+        Cohesion::ContactArea { .. } => ", sjkr",
+        Cohesion::Dmt { .. } => ", sjkr as the nearest it has",
+    };
+    format!("{normal}{turning}{cohesion}")
+}
+
+/// Rolling resistance of the model: μ_r and η_r of its `epsd`.
+fn epsd(case: &Case) -> Option<[f64; 2]> {
+    match (case.law, case.rolling) {
+        (
+            _,
+            Rolling::Epsd {
+                friction,
+                damping_ratio,
+            },
+        ) => Some([friction, damping_ratio]),
+        (
+            _,
+            Rolling::Shape {
+                beta,
+                rolling_friction,
+                ..
+            },
+        ) => Some([beta * rolling_friction, 0.0]),
+        (Law::Jkr { .. }, Rolling::Free) => Some([0.02, 0.0]),
+        (_, Rolling::Free) => None,
+    }
+}
+
+/// Cohesion energy density (J/m³) of its `sjkr`.
+fn sjkr(case: &Case) -> Option<f64> {
+    // The pull of some five weights of a grain, as the other laws'.
+    const LIKE_THE_OTHERS: f64 = 4e4;
+    match (case.law, case.cohesion) {
+        (_, Cohesion::ContactArea { density }) => Some(density),
+        (_, Cohesion::Dmt { .. }) | (Law::Jkr { .. }, Cohesion::None) => Some(LIKE_THE_OTHERS),
+        (_, Cohesion::None) => None,
     }
 }
 
@@ -33,7 +81,7 @@ pub fn deck(case: &Case) -> String {
         let values = vec![value.to_string(); repeat].join(" ");
         format!("fix property{count} all property/global {name} {kind} {values}\n")
     };
-    let (lines, model) = match case.law {
+    let (mut lines, mut model) = match case.law {
         Law::Hooke {
             stiffness,
             tangential,
@@ -51,7 +99,7 @@ pub fn deck(case: &Case) -> String {
                 property("coefficientFriction", true, friction),
             ]
             .concat(),
-            "hooke/stiffness tangential history tangential_damping off",
+            "hooke/stiffness tangential history".to_owned(),
         ),
         Law::HertzMindlin {
             young,
@@ -66,11 +114,36 @@ pub fn deck(case: &Case) -> String {
                 property("coefficientFriction", true, friction),
             ]
             .concat(),
-            "hertz tangential history",
+            "hertz tangential history".to_owned(),
+        ),
+        Law::Viscoelastic { young, poisson, .. } | Law::Jkr { young, poisson, .. } => (
+            [
+                property("youngsModulus", false, young),
+                property("poissonsRatio", false, poisson),
+                property("coefficientRestitution", true, 0.5),
+                property("coefficientFriction", true, 0.5),
+            ]
+            .concat(),
+            "hertz tangential history".to_owned(),
         ),
     };
+    // The models of a style are named in this order.
+    if let Some(density) = sjkr(case) {
+        lines.push_str(&property("cohesionEnergyDensity", true, density));
+        model.push_str(" cohesion sjkr");
+    }
+    if let Some([friction, damping]) = epsd(case) {
+        lines.push_str(&property("coefficientRollingFriction", true, friction));
+        lines.push_str(&property("coefficientRollingViscousDamping", true, damping));
+        model.push_str(" rolling_friction epsd");
+    }
     d.push_str(&lines);
-    let _ = writeln!(d, "pair_style gran model {model}\npair_coeff * *");
+    // Walls do not take the word; the coefficient of zero says the same.
+    let off = match case.law {
+        Law::Hooke { .. } if case.walls.is_empty() => " tangential_damping off",
+        _ => "",
+    };
+    let _ = writeln!(d, "pair_style gran model {model}{off}\npair_coeff * *");
     for (k, wall) in case.walls.iter().enumerate() {
         let (axis, at) = (["x", "y", "z"][wall.axis], wall.position);
         let _ = writeln!(
@@ -100,5 +173,14 @@ mod tests {
         let settled = deck(&case("settled").unwrap());
         assert!(settled.contains("coefficientRestitution peratomtypepair 1 0.5\n"));
         assert_eq!(settled.matches("primitive type 1").count(), 5);
+        let cohesive = deck(&case("settled-cohesion").unwrap());
+        assert!(cohesive.contains("cohesionEnergyDensity peratomtypepair 1 40000\n"));
+        let model = "hertz tangential history cohesion sjkr rolling_friction epsd";
+        assert_eq!(cohesive.matches(model).count(), 6);
+        assert_eq!(
+            deck(&case("settled-jkr").unwrap()).matches(model).count(),
+            6
+        );
+        assert!(law(&case("settled-jkr").unwrap()).contains("nearest"));
     }
 }

@@ -12,6 +12,7 @@ pub mod case;
 pub mod esys;
 pub mod find;
 pub mod lammps;
+pub mod law;
 pub mod liggghts;
 pub mod machine;
 pub mod ours;

@@ -1,12 +1,14 @@
 //! Our own side: the case as a `Simulation`, run in a process of its own like the others.
 
-use super::case::{Case, Law};
+use super::case::Case;
+use super::law::{Cohesion, Law, Rolling};
 use super::machine::processor_time;
+use colluvium_dem as dem;
 use colluvium_dem::contact::mindlin::SpringMemory;
 use colluvium_dem::contact::{Damping, Elasticity, Mindlin, SpringStiffness, Tangential};
 use colluvium_dem::{
-    ContactLaw, Diverged, Domain, Hooke, Lever, Setup, SetupError, Simulation, Snapshot,
-    TangentialSpring, Threads, Wall,
+    ContactLaw, Diverged, Domain, Epsd, Hooke, Jkr, Laws, Lever, Normal, Setup, SetupError,
+    ShapeParameter, Simulation, Snapshot, TangentialSpring, Threads, Viscoelastic, Wall,
 };
 use nalgebra::Vector3;
 use std::time::Instant;
@@ -23,13 +25,33 @@ pub enum OursFailed {
 }
 
 /// The law of our own run, in words.
-pub fn law_in_words(case: &Case) -> &'static str {
-    match case.law {
+pub fn law_in_words(case: &Case) -> String {
+    let normal = match case.law {
         Law::Hooke { .. } => "the case's; radii as arms, pull at release kept",
         Law::HertzMindlin { .. } => {
             "the case's: Hertz, Mindlin with the spring's displacement kept; arms to the contact point"
         }
-    }
+        Law::Viscoelastic { .. } => {
+            "the case's: viscous elastic spheres, Mindlin with the spring's displacement kept"
+        }
+        Law::Jkr { .. } => "the case's: JKR, sliding, rolling, twisting",
+    };
+    let turning = match case.rolling {
+        Rolling::Free => "",
+        Rolling::Epsd { .. } => ", EPSD",
+        Rolling::Shape { .. } => ", rolling and twisting springs",
+    };
+    let cohesion = match case.cohesion {
+        Cohesion::None => "",
+        Cohesion::ContactArea { .. } => ", constant strength on the patch of a typical contact",
+        Cohesion::Dmt { .. } => ", DMT",
+    };
+    let materials = if case.two_materials {
+        ", two materials in turns"
+    } else {
+        ""
+    };
+    format!("{normal}{turning}{cohesion}{materials}")
 }
 
 /// The chute's law, with LAMMPS' lever arms.
@@ -52,25 +74,21 @@ fn chute_law(stiffness: f64, tangential: f64, damping: f64, friction: f64) -> Co
     }
 }
 
-/// The settled bed's law. The other codes keep the displacement of a spring whose contact stiffens, so
-/// we do here.
-fn settled_law(young: f64, poisson: f64, restitution: f64, friction: f64) -> ContactLaw {
-    let material = Elasticity {
-        youngs_modulus: young,
-        poissons_ratio: poisson,
-    };
-    let spring = Mindlin {
+/// Friction of a Hertz contact. The other codes keep the displacement of a spring whose contact
+/// stiffens, so we do here.
+fn mindlin(material: Elasticity, restitution: f64, friction: f64) -> Tangential {
+    Tangential::Mindlin(Mindlin {
         memory: SpringMemory::Displacement,
         ..Mindlin::of(material, restitution, friction)
-    };
-    ContactLaw {
-        tangential: Tangential::Mindlin(spring),
-        ..ContactLaw::hertz_mindlin(material, restitution, friction)
-    }
+    })
 }
 
 fn law(case: &Case) -> ContactLaw {
-    match case.law {
+    let material = |young, poisson| Elasticity {
+        youngs_modulus: young,
+        poissons_ratio: poisson,
+    };
+    let law = match case.law {
         Law::Hooke {
             stiffness,
             tangential,
@@ -82,7 +100,79 @@ fn law(case: &Case) -> ContactLaw {
             poisson,
             restitution,
             friction,
-        } => settled_law(young, poisson, restitution, friction),
+        } => {
+            let material = material(young, poisson);
+            ContactLaw {
+                tangential: mindlin(material, restitution, friction),
+                ..ContactLaw::hertz_mindlin(material, restitution, friction)
+            }
+        }
+        Law::Viscoelastic {
+            young,
+            poisson,
+            dissipation,
+            friction,
+        } => {
+            let material = material(young, poisson);
+            // Of the restitution only the tangential dashpot is made.
+            ContactLaw {
+                normal: Normal::Viscoelastic(Viscoelastic::of(material, dissipation)),
+                tangential: mindlin(material, 0.5, friction),
+                ..ContactLaw::hertz_mindlin(material, 0.5, friction)
+            }
+        }
+        Law::Jkr {
+            young,
+            poisson,
+            surface_energy,
+            damping_rate,
+            critical_rolling,
+        } => ContactLaw::adhesive(Jkr {
+            surface_energy,
+            elasticity: material(young, poisson),
+            damping_rate,
+            critical_rolling,
+        }),
+    };
+    ContactLaw {
+        rolling: match case.rolling {
+            Rolling::Free => law.rolling,
+            Rolling::Epsd {
+                friction,
+                damping_ratio,
+            } => dem::Rolling::Epsd(Epsd {
+                rolling_friction: friction,
+                damping_ratio,
+            }),
+            Rolling::Shape {
+                beta,
+                rolling_friction,
+                twisting_friction,
+            } => dem::Rolling::Shape(ShapeParameter {
+                beta,
+                rolling_friction,
+                twisting_friction,
+            }),
+        },
+        cohesion: match case.cohesion {
+            Cohesion::None => dem::Cohesion::None,
+            Cohesion::ContactArea { density } => constant_strength(density),
+            Cohesion::Dmt { work_of_adhesion } => dem::Cohesion::Dmt {
+                work_of_adhesion,
+                asperity_radius: None,
+            },
+        },
+        ..law
+    }
+}
+
+/// A strength on a patch that pulls as `density` does on the contact area 2π R x at an overlap x of 1 % of
+/// the reduced radius R: c 4 (βR)² = density · 2π R · 0.01 R.
+fn constant_strength(density: f64) -> dem::Cohesion {
+    let patch: f64 = 0.2;
+    dem::Cohesion::Constant {
+        strength: density * 2.0 * std::f64::consts::PI * 0.01 / (4.0 * patch * patch),
+        patch,
     }
 }
 
@@ -92,6 +182,15 @@ fn setup(case: &Case, timestep: f64, threads: Threads) -> Setup {
         normal[wall.axis] = if wall.grains_above { 1.0 } else { -1.0 };
         Wall::plane(normal.abs() * wall.position, normal)
     });
+    let law = law(case);
+    let mut grains = case.grains.clone();
+    let mut laws = Laws::from(law);
+    if case.two_materials {
+        laws.own.push(law);
+        for (k, grain) in grains.iter_mut().enumerate() {
+            grain.material = (k % 2) as u16;
+        }
+    }
     Setup {
         domain: Domain {
             lower: case.lower.into(),
@@ -99,8 +198,8 @@ fn setup(case: &Case, timestep: f64, threads: Threads) -> Setup {
             periodic: case.periodic,
         },
         gravity: case.gravity.into(),
-        law: law(case).into(),
-        grains: case.grains.clone(),
+        law: laws,
+        grains,
         walls: walls.collect(),
         bodies: Vec::new(),
         timestep,

@@ -18,7 +18,7 @@ pub struct Row {
     /// What the code calls itself.
     pub version: String,
     /// The law it solves.
-    pub law: &'static str,
+    pub law: String,
     /// Grain-steps per second of wall time.
     pub wall_rate: Option<Spread>,
     /// Grain-steps per second of CPU time.
@@ -77,7 +77,7 @@ fn row(c: &Comparison, entrant: &Entrant) -> Row {
         code: entrant.code,
         threads: entrant.threads,
         version: first.map(|t| t.version.clone()).unwrap_or_default(),
-        law: entrant.law,
+        law: entrant.law.clone(),
         wall_rate: rates(&wall),
         cpu_rate: rates(&cpu),
         wall_ratio: ratios(&wall),
@@ -258,7 +258,7 @@ mod tests {
         Entrant {
             code,
             threads: 1,
-            law: "a law",
+            law: "a law".into(),
             traces: walls.iter().map(trace).collect(),
             trouble: None,
         }

@@ -16,7 +16,7 @@ pub struct Entrant {
     /// Cores it may use.
     pub threads: usize,
     /// The law it solves.
-    pub law: &'static str,
+    pub law: String,
     /// One trace a round; none where it failed.
     pub traces: Vec<Option<Trace>>,
     /// Why it failed or does not take part.

@@ -28,7 +28,7 @@ pub struct Place<'a> {
 }
 
 /// The law a code solves, in words.
-pub fn law(code: Code, case: &Case) -> &'static str {
+pub fn law(code: Code, case: &Case) -> String {
     match code {
         Code::Colluvium => super::ours::law_in_words(case),
         Code::Lammps => lammps::law(case),
@@ -40,7 +40,11 @@ pub fn law(code: Code, case: &Case) -> &'static str {
 
 /// Why a code cannot run a case at all, if it cannot.
 pub fn unfit(code: Code, case: &Case) -> Option<&'static str> {
-    (code == Code::Esys).then(|| esys::unfit(case)).flatten()
+    match code {
+        Code::Yade => yade::unfit(case),
+        Code::Esys => esys::unfit(case),
+        Code::Colluvium | Code::Lammps | Code::Liggghts => None,
+    }
 }
 
 /// Writes start state and deck of a case for a code.

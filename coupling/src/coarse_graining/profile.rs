@@ -55,6 +55,11 @@ pub struct ProfileRow {
     pub mu: Option<Estimate>,
     /// τ/σ_zz.
     pub mu_zz: Option<Estimate>,
+    /// What the momentum of all that lies above asks of τ/σ_zz: `(g_x M − ∂J_x/∂t)/(∂J_z/∂t − g_z M)`, M its mass and J its
+    /// momentum. In a steady flow tan θ; less where the flow becomes faster, most near its surface. None where a wall
+    /// bears some of it.
+    #[serde(default)]
+    pub mu_zz_balance: Option<f64>,
 }
 
 /// How well the averages obey mass and momentum balance.
@@ -232,7 +237,7 @@ impl Profile {
         means: &[Quantities],
         without: &[Vec<Quantities>],
         layers: &Layering,
-        balance: BalanceCheck,
+        (balance, asked): (BalanceCheck, Vec<Option<f64>>),
         samples: u64,
         duration: f64,
     ) -> Self {
@@ -290,6 +295,7 @@ impl Profile {
                 i: get(q::I),
                 mu: get(q::MU),
                 mu_zz: get(q::MU_ZZ),
+                mu_zz_balance: asked.get(k).copied().flatten(),
             });
         }
         Self {
@@ -305,7 +311,7 @@ impl Profile {
 
 impl BalanceCheck {
     /// Integrates ∂ₜj + ∇·(ρuu − σ) = t + ρg from the top down to each layer, averaged over the layer:
-    /// −σ_αz = ∂ₜJ_above − g_α M_above − T_above (per floor area).
+    /// −σ_αz = ∂ₜJ_above − g_α M_above − T_above (per floor area). With it, what that makes of τ/σ_zz in each layer.
     pub(super) fn of(
         sums: &[f64],
         samples: u64,
@@ -314,10 +320,11 @@ impl BalanceCheck {
         floor_area: f64,
         gravity: [f64; 3],
         momentum_rate_above: &dyn Fn(usize, usize) -> f64,
-    ) -> Self {
+    ) -> (Self, Vec<Option<f64>>) {
         let n = layers.count;
+        let mut asked = vec![None; n];
         if samples == 0 {
-            return Self::default();
+            return (Self::default(), asked);
         }
         let s = samples as f64;
         let tail = &sums[field::COUNT * n..];
@@ -346,6 +353,10 @@ impl BalanceCheck {
             any_wall |= at(field::WALL + 2) != 0.0;
             check.normal_relative = check.normal_relative.max(residual(2).abs() / whole);
             check.downslope_relative = check.downslope_relative.max(residual(0).abs() / whole);
+            let momentum = |axis: usize| {
+                gravity[axis] * mass_above - momentum_rate_above(axis, k) / floor_area
+            };
+            asked[k] = (!any_wall && momentum(2) < 0.0).then(|| momentum(0).abs() / -momentum(2));
             let weight = -gravity[2] * mass_above;
             if !any_wall && weight > 0.1 * whole && weight > 0.0 {
                 let carried = means[k][q::SIGMA_ZZ];
@@ -358,7 +369,7 @@ impl BalanceCheck {
         }
         // At the lowest layer everything lies above, but for half of that layer.
         check.acceleration = momentum_rate_above(0, 0) * s / total;
-        check
+        (check, asked)
     }
 }
 

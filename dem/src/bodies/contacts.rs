@@ -420,8 +420,8 @@ impl Bodies {
         } else {
             1.0 / walls[b].rounding
         };
-        let held = if I::HOLDS && history[I::HISTORY - 1] != 0.0 {
-            law.hold(coefficients, curvature)
+        let held = if I::HOLDS {
+            law.hold(coefficients, history[I::HISTORY - 1])
         } else {
             0.0
         };

@@ -35,7 +35,8 @@ pub struct Pressing<L> {
     pub stiffness: L,
     /// Coefficient of its dashpot (N s/m).
     pub damping: L,
-    /// A measure that all stiffnesses of the contact grow with, where they grow.
+    /// A measure that all stiffnesses of the contact grow with, where they grow; what a contact that holds
+    /// across a gap remembers, above zero.
     pub memory: L,
 }
 
@@ -82,10 +83,11 @@ pub trait NormalPart: Copy + Send + Sync {
     const STIFFENS: bool;
     /// Whether an established contact holds across a gap.
     const HOLDS: bool;
-    /// Force of an overlap and an approach speed (m/s).
-    fn press<L: Lane>(c: &[L], touch: &Touch<L>, approach: L) -> Pressing<L>;
-    /// Gap up to which a contact holds (m) at a curvature (1/m).
-    fn hold<L: Lane>(c: &[L], curvature: L) -> L;
+    /// Force of an overlap and an approach speed (m/s); `memory` is what an established contact that holds
+    /// remembers, zero for others.
+    fn press<L: Lane>(c: &[L], touch: &Touch<L>, approach: L, memory: L) -> Pressing<L>;
+    /// Gap up to which a contact holds (m) that remembers this; none for a memory of zero.
+    fn hold<L: Lane>(c: &[L], memory: L) -> L;
     /// Energy stored (J).
     fn stored(c: &[f64], overlap: f64, curvature: f64) -> f64;
     /// Secant stiffness (N/m).
@@ -292,7 +294,12 @@ where
         let layout = Layout::<N, T, R>::MEMORY;
         let one = L::splat(1.0);
         let approach = -touch.velocity.dot(touch.normal);
-        let pressing = N::press(n, touch, approach);
+        let remembered = if N::HOLDS {
+            history[layout]
+        } else {
+            L::splat(0.0)
+        };
+        let pressing = N::press(n, touch, approach, remembered);
         let kept = if Layout::<N, T, R>::REMEMBERS {
             (history[layout] / pressing.memory).min(one)
         } else {
@@ -326,10 +333,8 @@ where
             }
             moment = turn.moment;
         }
-        if Layout::<N, T, R>::REMEMBERS {
+        if Layout::<N, T, R>::REMEMBERS || N::HOLDS {
             history[layout] = pressing.memory;
-        } else if N::HOLDS {
-            history[layout] = one;
         }
         // A branch instead of a type: it costs nothing that can be measured, and halves the number of
         // inner loops.
@@ -346,8 +351,8 @@ where
     }
 
     #[inline(always)]
-    fn hold<L: Lane>(&self, coefficients: &[L; COEFFICIENTS], curvature: L) -> L {
-        N::hold(&coefficients[..N::COEFFICIENTS], curvature)
+    fn hold<L: Lane>(&self, coefficients: &[L; COEFFICIENTS], memory: L) -> L {
+        N::hold(&coefficients[..N::COEFFICIENTS], memory)
     }
 
     fn stored(

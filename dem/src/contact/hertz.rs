@@ -114,7 +114,7 @@ impl NormalPart for Elastic {
     const HOLDS: bool = false;
 
     #[inline(always)]
-    fn press<L: Lane>(c: &[L], touch: &Touch<L>, approach: L) -> Pressing<L> {
+    fn press<L: Lane>(c: &[L], touch: &Touch<L>, approach: L, _: L) -> Pressing<L> {
         let contact_radius = (touch.overlap / touch.curvature).sqrt();
         let stiffness = c[0] * contact_radius;
         let damping = c[1] * (contact_radius / touch.inverse_mass).sqrt();

@@ -112,7 +112,7 @@ impl NormalPart for Linear {
     const HOLDS: bool = false;
 
     #[inline(always)]
-    fn press<L: Lane>(c: &[L], touch: &Touch<L>, approach: L) -> Pressing<L> {
+    fn press<L: Lane>(c: &[L], touch: &Touch<L>, approach: L, _: L) -> Pressing<L> {
         let mass = L::splat(1.0) / touch.inverse_mass;
         let damping = c[1] * mass.sqrt() + c[2] * mass;
         Pressing {
@@ -159,7 +159,7 @@ mod tests {
         let (mut gap, mut v, mut touching) = (offset * dt, -1.0, 0.0);
         loop {
             if gap < 0.0 {
-                v += dt * Linear::press(&c, &touch(gap), -v).force;
+                v += dt * Linear::press(&c, &touch(gap), -v, 0.0).force;
                 touching += dt;
             } else if v > 0.0 {
                 return (v, touching);

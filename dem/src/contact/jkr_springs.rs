@@ -46,9 +46,13 @@ impl Jkr {
     }
 
     pub(super) fn sliding_coefficients(&self) -> [f64; 3] {
-        // a_0 = (9πγR²/E*)^{1/3} as the cube root of a factor times R².
+        // a_0 = (9πγR²/E*)^{1/3}: the cube root of a factor times the square of what a contact remembers.
         let shear = self.elasticity.effective_shear(&self.elasticity);
-        [self.cube_of_equilibrium(), 8.0 * shear, self.slip_ratio()]
+        [
+            self.cube_of_equilibrium().cbrt(),
+            8.0 * shear,
+            self.slip_ratio(),
+        ]
     }
 
     pub(super) fn rolling_coefficients(&self) -> [f64; 3] {
@@ -68,7 +72,7 @@ impl Jkr {
 /// Angle at which twisting yields (rad).
 const CRITICAL_TWIST: f64 = 1.0 / (16.0 * PI);
 
-/// In the inner loop: a_0³/R², 8 G*, critical slip over a_0.
+/// In the inner loop: a_0/R^{2/3}, 8 G*, critical slip over a_0.
 #[derive(Clone, Copy, Debug)]
 pub struct Slides;
 
@@ -83,11 +87,11 @@ impl TangentialPart for Slides {
         touch: &Touch<L>,
         spring: Vec3<L>,
         _: L,
-        _: &Pressing<L>,
+        pressing: &Pressing<L>,
         step: Step,
     ) -> Shear<L> {
         let zero = L::splat(0.0);
-        let contact_radius = (c[0] / (touch.curvature * touch.curvature)).cbrt();
+        let contact_radius = c[0] * pressing.memory * pressing.memory;
         let stiffness = c[1] * contact_radius;
         let slip = touch.velocity.reject(touch.normal);
         let stretched = (spring + slip.scale(L::splat(step.stretch))).reject(touch.normal);
@@ -102,7 +106,7 @@ impl TangentialPart for Slides {
     }
 
     fn stiffness(c: &[f64], _: f64, curvature: f64) -> f64 {
-        c[1] * (c[0] / (curvature * curvature)).cbrt()
+        c[1] * c[0] * (1.0 / curvature).cbrt().powi(2)
     }
 }
 
@@ -122,12 +126,12 @@ impl RollingPart for Rolls {
         c: &[L],
         touch: &Touch<L>,
         wound: &Wound<L>,
-        _: &Pressing<L>,
+        pressing: &Pressing<L>,
         _: &Shear<L>,
         step: Step,
     ) -> Turn<L> {
         let zero = L::splat(0.0);
-        let radius = L::splat(1.0) / touch.curvature;
+        let radius = pressing.memory * pressing.memory * pressing.memory;
         let stretch = L::splat(step.stretch);
         let twist_rate = touch.spin.dot(touch.normal);
         let roll_rate = touch.spin - touch.normal.scale(twist_rate);

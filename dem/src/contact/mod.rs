@@ -366,8 +366,8 @@ pub trait Interaction: Copy + Send + Sync {
         history: &mut [L; HISTORY_MAX],
         step: Step,
     ) -> Wrench<L>;
-    /// Gap up to which an established contact holds (m).
-    fn hold<L: Lane>(&self, coefficients: &[L; COEFFICIENTS], curvature: L) -> L;
+    /// Gap up to which a contact holds (m) whose last number of history is `memory`; zero where that is.
+    fn hold<L: Lane>(&self, coefficients: &[L; COEFFICIENTS], memory: L) -> L;
     /// Energy stored by a contact.
     fn stored(
         &self,

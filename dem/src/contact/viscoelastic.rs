@@ -48,7 +48,7 @@ impl NormalPart for Viscous {
     const HOLDS: bool = false;
 
     #[inline(always)]
-    fn press<L: Lane>(c: &[L], touch: &Touch<L>, approach: L) -> Pressing<L> {
+    fn press<L: Lane>(c: &[L], touch: &Touch<L>, approach: L, _: L) -> Pressing<L> {
         let contact_radius = (touch.overlap / touch.curvature).sqrt();
         let stiffness = c[0] * contact_radius;
         let damping = stiffness * c[1];

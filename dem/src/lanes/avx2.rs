@@ -155,6 +155,10 @@ impl Lane for Avx2 {
         // SAFETY: the module's invariant: AVX2 is present.
         Avx2(unsafe { _mm256_blendv_pd(no.0, yes.0, mask) })
     }
+    #[inline(always)]
+    fn all(mask: __m256d) -> bool {
+        Self::lanes(mask) == 0b1111
+    }
 }
 
 impl Lanes4 for Avx2 {

@@ -94,6 +94,10 @@ impl Lane for Avx512 {
         // SAFETY: the module's invariant: AVX-512 is present.
         Avx512(unsafe { _mm512_mask_blend_pd(mask, no.0, yes.0) })
     }
+    #[inline(always)]
+    fn all(mask: __mmask8) -> bool {
+        mask == u8::MAX
+    }
 }
 
 impl Avx512 {

@@ -43,6 +43,8 @@ pub trait Lane:
     fn less(self, other: Self) -> Self::Mask;
     /// `yes` where the mask is set, `no` elsewhere.
     fn select(mask: Self::Mask, yes: Self, no: Self) -> Self;
+    /// Whether the mask is set in every lane.
+    fn all(mask: Self::Mask) -> bool;
 }
 
 /// A row of four numbers.
@@ -287,6 +289,10 @@ impl Lane for f64 {
     #[inline(always)]
     fn select(mask: bool, yes: Self, no: Self) -> Self {
         if mask { yes } else { no }
+    }
+    #[inline(always)]
+    fn all(mask: bool) -> bool {
+        mask
     }
 }
 

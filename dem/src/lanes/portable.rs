@@ -82,6 +82,10 @@ impl Lane for Portable {
             if mask[k] { yes.0[k] } else { no.0[k] }
         }))
     }
+    #[inline(always)]
+    fn all(mask: [bool; 4]) -> bool {
+        mask == [true; 4]
+    }
 }
 
 impl Lanes4 for Portable {

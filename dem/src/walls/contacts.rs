@@ -459,7 +459,7 @@ fn meet_mesh<I: Interaction>(
     let held = if I::HOLDS && known > 0 {
         law.hold(
             wall.coefficients(law, scene.grains, grain),
-            scene.grains.turn[grain][3] + wall.curvature(),
+            before[0].history[I::HISTORY - 1],
         )
     } else {
         0.0
@@ -539,8 +539,8 @@ impl WallContact {
         let coefficients = wall.coefficients(law, grains, g);
         let overlap = x[3] - foot.distance;
         let curvature = s[3] + wall.curvature();
-        let held = if I::HOLDS && self.history[I::HISTORY - 1] != 0.0 {
-            law.hold(coefficients, curvature)
+        let held = if I::HOLDS {
+            law.hold(coefficients, self.history[I::HISTORY - 1])
         } else {
             0.0
         };

@@ -10,7 +10,7 @@ use crate::run::RunOptions;
 use crate::scene::Scene;
 use colluvium_coupling::calibration::thesis::{Estimator, PublishedRow, TABLE_2_6};
 use colluvium_coupling::coarse_graining::ProfileRow;
-use colluvium_coupling::incline::{InclineResult, Outcome, Purpose};
+use colluvium_coupling::incline::{InclineResult, Purpose};
 use maud::{Markup, html};
 
 /// A pair (I, μ) of another code, with what else it measured; errors are standard deviations over its layers.
@@ -148,34 +148,45 @@ fn measured(campaign: &Campaign) -> impl Iterator<Item = &InclineResult> {
     runs.filter(|r| r.purpose == Purpose::Measure && r.profile.is_some())
 }
 
-/// Momentum balance of each flow: μ_zz through the bulk is tan θ, less what accelerates it; σ_zz is the weight; velocity
-/// rises with the 3/2 power of the depth below the surface.
+/// Momentum balance of each flow: μ_zz through the bulk is what the momentum above each layer asks for, tan θ where the flow
+/// is steady; σ_zz is the weight; velocity rises with the 3/2 power of the depth below the surface.
 fn balance(name: &str, campaign: &Campaign, found: &mut Found) {
     for run in measured(campaign).filter(|r| !r.points.is_empty()) {
         let slope = run.slope_degrees.to_radians();
-        let acceleration = run.checks.map_or(0.0, |c| c.acceleration);
-        let expected = slope.tan() - acceleration / (campaign.gravity * slope.cos());
-        let n = run.points.len() as f64;
-        let mean = run.points.iter().map(|p| p.friction_zz).sum::<f64>() / n;
-        let error = run.points.iter().map(|p| p.friction_zz_error).sum::<f64>() / n;
         let case = format!("{name} at {}°", run.slope_degrees);
-        let steady = run.outcome == Outcome::Steady;
-        let words = if steady {
-            "tan θ"
-        } else {
-            "tan θ − a/(g cos θ)"
+        let rows = run.profile.iter().flat_map(|p| &p.rows);
+        let asked: Vec<(f64, f64, f64)> = rows
+            .filter(|row| run.points.iter().any(|p| p.z == row.z))
+            .filter_map(|row| {
+                let measured = row.mu_zz?;
+                Some((measured.value, measured.error, row.mu_zz_balance?))
+            })
+            .collect();
+        let mean = |of: &dyn Fn(&(f64, f64, f64)) -> f64| {
+            asked.iter().map(of).sum::<f64>() / asked.len().max(1) as f64
         };
+        let expected = mean(&|a| a.2);
         found.checks.push(Check {
-            error: Some(error),
+            error: Some(mean(&|a| a.1)),
             ..told(
-                format!("|τ|/σ_zz, mean over the bulk, against {words}"),
-                mean,
+                "|τ|/σ_zz, mean over the bulk, against the momentum above".into(),
+                mean(&|a| a.0),
                 expected,
                 Some(0.01 * expected),
-                "momentum balance along the slope",
+                "momentum balance along the slope, layer by layer: tan θ less what accelerates the flow",
             )
             .named(&case)
         });
+        found.checks.push(
+            told(
+                "what accelerates the flow, in the bulk: tan θ less the momentum's |τ|/σ_zz".into(),
+                slope.tan() - expected,
+                0.0,
+                None,
+                "0 in a steady flow",
+            )
+            .named(&case),
+        );
         if let Some(checks) = run.checks {
             let source = "weight above; worst layer";
             found.checks.push(
