@@ -31,6 +31,9 @@ pub struct CollapseCase {
     pub cells: usize,
     /// Length of the grid over the height of the column.
     pub length_scaled: f64,
+    /// How far the face of the column leans out over its foot, from the vertical (degrees); a cliff.
+    #[serde(default)]
+    pub overhang_degrees: f64,
 }
 
 /// Height of the grid over the height of the column.
@@ -59,11 +62,19 @@ impl CollapseCase {
         ] {
             require(value > 0.0, key, value, "greater than 0 and finite")?;
         }
+        let degrees = self.overhang_degrees;
         require(
-            self.length_scaled > 1.0 / self.aspect,
+            (0.0..=60.0).contains(&degrees),
+            "overhang_degrees",
+            degrees,
+            "in [0, 60]",
+        )?;
+        let least = 1.0 / self.aspect + self.overhang();
+        require(
+            self.length_scaled > least,
             "grid.length_scaled",
             self.length_scaled,
-            format!("greater than the column, 1/aspect = {}", 1.0 / self.aspect),
+            format!("greater than the column with its overhang, {least}"),
         )?;
         let per_height = self.cells as f64 / self.length_scaled;
         let smallest = per_height.min(per_height / self.aspect);
@@ -76,6 +87,11 @@ impl CollapseCase {
                 (self.cells as f64 * FEWEST_CELLS / smallest).ceil()
             ),
         )
+    }
+
+    /// tan of the angle by which the face leans out.
+    fn overhang(&self) -> f64 {
+        self.overhang_degrees.to_radians().tan()
     }
 
     /// Natural units of the computation: height, bulk density, √(g H).
@@ -97,10 +113,9 @@ impl CollapseCase {
             axis(self.cells, Boundary::FreeSlip),
             axis(rows, Boundary::NoSlip { velocity: 0.0 }),
         ])?;
-        let covered = |length: f64, index: usize| (length / spacing - index as f64).clamp(0.0, 1.0);
         let fractions = (0..rows)
             .flat_map(|k| (0..self.cells).map(move |i| (i, k)))
-            .map(|(i, k)| covered(1.0 / self.aspect, i) * covered(1.0, k))
+            .map(|(i, k)| self.covered(spacing, i, k))
             .collect();
         SurfaceFlow::at_rest(
             grid,
@@ -109,6 +124,30 @@ impl CollapseCase {
             [0.0, -1.0],
             *options,
         )
+    }
+}
+
+impl CollapseCase {
+    /// Share of a cell of the grid that the column covers: below its top, and behind its face, which leans out
+    /// by `tan θ` a unit of height. Exact: the mean over the covered rows of `clamp(x_face(z)/h - i, 0, 1)`.
+    fn covered(&self, spacing: f64, i: usize, k: usize) -> f64 {
+        let high = (1.0 / spacing - k as f64).clamp(0.0, 1.0);
+        if high == 0.0 {
+            return 0.0;
+        }
+        let face = |row: f64| 1.0 / self.aspect / spacing + self.overhang() * row - i as f64;
+        let (low_end, high_end) = (face(k as f64), face(k as f64 + high));
+        // Integral of the clamp from 0.
+        let integral = |u: f64| {
+            let v = u.clamp(0.0, 1.0);
+            0.5 * v * v + (u - 1.0).max(0.0)
+        };
+        let along = if high_end - low_end > 1e-12 {
+            (integral(high_end) - integral(low_end)) / (high_end - low_end)
+        } else {
+            low_end.clamp(0.0, 1.0)
+        };
+        high * along
     }
 }
 

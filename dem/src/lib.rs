@@ -15,6 +15,7 @@ mod checkpoint;
 mod chunk;
 pub mod contact;
 mod contacts;
+mod conversion;
 mod domain;
 mod energy;
 mod forces;

@@ -10,8 +10,8 @@ use crate::failure::Failure;
 use crate::run;
 use crate::run::step;
 use crate::scene::{
-    BagnoldScene, FrictionLaw, ImpactScene, InclineScene, InclineStart, LayerCase, RheologyKeys,
-    Scene, SceneBody,
+    BagnoldScene, CollapseModel, FrictionLaw, ImpactScene, InclineScene, InclineStart, LayerCase,
+    RheologyKeys, Scene, SceneBody,
 };
 use colluvium_coupling::incline::{InclineRun, InclineSpec};
 use colluvium_dem::preparation::settle_incline_bed;
@@ -26,6 +26,9 @@ pub fn plan(scene: &Scene) -> Result<String, Failure> {
     match &scene.body {
         SceneBody::Incline(body) => incline(scene, body),
         SceneBody::Bagnold(body) => bagnold(body),
+        SceneBody::Collapse(body) if body.model == CollapseModel::Dem => {
+            world::plan(scene, body.as_ref())
+        }
         SceneBody::Collapse(body) => Ok(collapse::collapse(body)),
         SceneBody::Impact(body) => impact(scene, body),
         SceneBody::Chute(body) => bed::chute(body),

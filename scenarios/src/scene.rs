@@ -11,7 +11,9 @@ mod bed;
 mod boulder;
 mod check;
 mod chute;
+mod cliff;
 mod collapse;
+mod collapse_grains;
 mod comet;
 mod error;
 mod friction_keys;
@@ -35,9 +37,11 @@ pub use ball_impact::BallImpactScene;
 pub use bed::Pace;
 pub use boulder::BoulderScene;
 pub use chute::ChuteScene;
+pub use cliff::{CliffCrackKeys, CliffModel, CliffScene, CliffShapeKeys};
 pub use collapse::{
     CollapseGrid, CollapseModel, CollapseScene, CollapseSolver, CollapseWalls, ThinLayerKind,
 };
+pub use collapse_grains::{CalibratedKind, ColumnFloorKind, ColumnGrainKeys};
 pub use comet::{CometBlockKeys, CometKeys, MixKind, Softness};
 pub use error::SceneError;
 pub use grains::GrainsScene;
@@ -61,7 +65,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// The names and texts of the bundled scenes.
-pub const BUNDLED: [(&str, &str); 16] = [
+pub const BUNDLED: [(&str, &str); 19] = [
     (
         "incline-moderate",
         include_str!("../scenes/incline-moderate.toml"),
@@ -96,6 +100,9 @@ pub const BUNDLED: [(&str, &str); 16] = [
         "column-collapse",
         include_str!("../scenes/column-collapse.toml"),
     ),
+    ("cliff", include_str!("../scenes/cliff.toml")),
+    ("cliff-aswan", include_str!("../scenes/cliff-aswan.toml")),
+    ("cliff-plain", include_str!("../scenes/cliff-plain.toml")),
 ];
 
 /// The text of a bundled scene.
@@ -218,14 +225,15 @@ impl Scene {
         // A rheology file is replaced by its numbers before layers are laid over each other, so
         // only the stiffness keys have defaults to drop.
         let kind = family(&name);
-        let drops = match kind {
-            Family::Bagnold | Family::Collapse => &[],
+        let drops: &[&[&str]] = match kind {
+            Family::Bagnold => &[],
+            Family::Collapse => &law::CHOICES,
             _ => choices,
         };
         let impact = matches!(kind, Family::Impact);
         let lawful = matches!(
             kind,
-            Family::Impact | Family::Chute | Family::Settle | Family::Grains
+            Family::Impact | Family::Chute | Family::Settle | Family::Grains | Family::Collapse
         );
         check::check(&own, &schema, origin)?;
         layers::check_choices(&own, choices, origin)?;
@@ -236,6 +244,9 @@ impl Scene {
             }
             if matches!(kind, Family::Grains) {
                 kinds::anchor(&mut own, folder);
+            }
+            if matches!(kind, Family::Collapse) {
+                kinds::anchor_packing(&mut own, "grains.packing", folder);
             }
         }
         // What was written, before a file's numbers take their places.
@@ -289,8 +300,13 @@ impl Scene {
         resolved.insert("scene".into(), toml::Value::String(name.clone()));
         resolved.extend(body.to_table());
         inputs.extend(body.start_file().map(PathBuf::from));
-        if let SceneBody::Grains(_) = &body {
-            inputs.extend(kinds::inputs(&resolved));
+        match &body {
+            SceneBody::Grains(_) => inputs.extend(kinds::inputs(&resolved)),
+            SceneBody::Collapse(scene) => {
+                let packing = scene.grains.packing.as_deref();
+                inputs.extend(packing.filter(|s| s.ends_with(".h5")).map(PathBuf::from));
+            }
+            _ => {}
         }
         let scene = Scene {
             name,
@@ -422,7 +438,7 @@ fn family(name: &str) -> Family {
         "chute" => Family::Chute,
         "settle" => Family::Settle,
         _ if Kind::NAMES.contains(&name) => Family::Grains,
-        "column-collapse" => Family::Collapse,
+        "column-collapse" | "cliff-plain" => Family::Collapse,
         _ => Family::Incline,
     }
 }
@@ -435,7 +451,8 @@ fn alternatives(name: &str) -> &'static [&'static [&'static str]] {
             "contact.stiffness",
             "contact.stiffness_from_speed",
         ]],
-        Family::Bagnold | Family::Collapse => rheology_file::ALTERNATIVES,
+        Family::Bagnold => rheology_file::ALTERNATIVES,
+        Family::Collapse => &COLLAPSE_CHOICES,
         Family::Impact | Family::Grains => &law::CHOICES,
         Family::Chute | Family::Settle => &BED_CHOICES,
     }
@@ -448,6 +465,22 @@ const BED_CHOICES: [&[&str]; 4] = [
     law::CHOICES[1],
     law::CHOICES[2],
 ];
+
+/// Alternatives of the collapse: those of its continuum and of its grains.
+const COLLAPSE_CHOICES: [&[&str]; rheology_file::ALTERNATIVES.len() + law::CHOICES.len()] = {
+    let mut all: [&[&str]; rheology_file::ALTERNATIVES.len() + law::CHOICES.len()] =
+        [&[]; rheology_file::ALTERNATIVES.len() + law::CHOICES.len()];
+    let (first, mut k) = (rheology_file::ALTERNATIVES.len(), 0);
+    while k < all.len() {
+        all[k] = if k < first {
+            rheology_file::ALTERNATIVES[k]
+        } else {
+            law::CHOICES[k - first]
+        };
+        k += 1;
+    }
+    all
+};
 
 /// The JSON Schema of one kind, without the key `scene`.
 fn body_schema(name: &str) -> Value {

@@ -9,13 +9,15 @@ pub(super) fn collapse(body: &CollapseScene) -> String {
     let case = run::collapse::case(body);
     let units = case.units();
     let spacing = body.grid.length_scaled * body.height / case.cells as f64;
-    let column = (body.height / spacing) * (case.width() / spacing);
+    let column = body.section(body.height) / (spacing * spacing);
     lines.say(
         "scene",
         &format!(
-            "column-collapse: a column {} m high and {:.4} m wide beside a plane of symmetry, on a rough floor",
+            "column-collapse: a column {} m high and {:.4} m wide, its face leaning out by {} degrees, beside a plane of symmetry, \
+             on a rough floor",
             body.height,
-            case.width()
+            case.width(),
+            body.overhang_degrees
         ),
     );
     lines.say_rheology(&body.rheology);

@@ -1,12 +1,14 @@
 //! The collapse of a column: from the scene to front and deposit.
 
+mod beside_continuum;
+
 use super::bagnold::failure;
-use super::{Findings, Under};
+use super::{Findings, Under, world};
 use crate::cost::Cost;
 use crate::failure::Failure;
 use crate::frames;
 use crate::progress::Bar;
-use crate::scene::{CollapseScene, Scene, ThinLayerKind};
+use crate::scene::{CollapseModel, CollapseScene, Scene, ThinLayerKind};
 use crate::state_hash;
 use crate::summary::{Model, Quantity, Summary};
 use crate::table::Table;
@@ -43,6 +45,7 @@ pub fn case(scene: &CollapseScene) -> CollapseCase {
         rheology: scene.rheology.mu_i(),
         cells: scene.cells(),
         length_scaled: scene.grid.length_scaled,
+        overhang_degrees: scene.overhang_degrees,
     }
 }
 
@@ -75,6 +78,9 @@ pub fn options(scene: &CollapseScene) -> SurfaceOptions {
 
 /// Checks the case and the settings before anything is written.
 pub(super) fn check(scene: &Scene, body: &CollapseScene) -> Result<(), Failure> {
+    if body.model == CollapseModel::Dem {
+        return world::course::check(scene, body);
+    }
     let named =
         |error: colluvium_continuum::Error| Failure::Input(format!("{}: {error}", scene.origin));
     case(body).validate().map_err(named)?;
@@ -220,6 +226,11 @@ impl Course {
 }
 
 pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, Failure> {
+    if scene.model == CollapseModel::Dem {
+        let mut findings = world::course::run(scene, under)?;
+        beside_continuum::set_beside(scene, &mut findings, under)?;
+        return Ok(findings);
+    }
     let mut collapse = match walls(scene) {
         None => Collapse::new(&case(scene), &options(scene)),
         Some(walls) => Collapse::between_side_walls(&case(scene), &options(scene), walls),
@@ -246,7 +257,7 @@ pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, 
     if fresh {
         picture(under, &collapse, 0)?;
     }
-    let bar = Bar::new("column-collapse");
+    let bar = Bar::new(&under.scene.name);
     while collapse.time() < end * (1.0 - 1e-9) && course.counts[4] < REST_STEPS {
         // Steps end at the instants of the tables, whenever a run was begun or resumed.
         let next = (collapse.time() / end * FRONTS + 1e-6).floor() + 1.0;
@@ -277,7 +288,7 @@ pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, 
         &collapse,
         (collapse.time() / end * FRONTS + 1e-6) as u64,
     )?;
-    let mut summary = Summary::begun("column-collapse", "run");
+    let mut summary = Summary::begun(&under.scene.name, "run");
     describe(&mut summary, scene, &collapse, &course, wall_s);
     Ok(Findings {
         summary,

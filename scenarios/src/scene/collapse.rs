@@ -1,6 +1,7 @@
 //! Keys of the collapse of a column.
 
-use super::{FrictionLaw, RheologyKeys, SceneError};
+use super::world::{OutputKeys, StepKeys};
+use super::{ColumnGrainKeys, FrictionLaw, LawKeys, RheologyKeys, SceneError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -16,6 +17,10 @@ pub struct CollapseScene {
     /// Height of the column (m).
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e5))]
     pub height: f64,
+    /// How far the face leans out over its foot, from the vertical: a cliff (degrees).
+    #[serde(default)]
+    #[schemars(extend("minimum" = 0.0, "maximum" = 60.0))]
+    pub overhang_degrees: f64,
     /// Gravity (m/s²).
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
     pub gravity: f64,
@@ -25,10 +30,10 @@ pub struct CollapseScene {
     /// Height over the column's at which the heap has its edge.
     #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
     pub front_height_scaled: f64,
-    /// Size of the run: cells along each axis grow with it.
+    /// Size of the run: cells along each axis grow with it, or the number of grains.
     #[schemars(extend("minimum" = 0.1, "maximum" = 64.0))]
     pub scale: f64,
-    /// The material.
+    /// The material of the continuum.
     pub rheology: RheologyKeys,
     /// Side walls of a narrow channel; a plane of any width without them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -37,6 +42,16 @@ pub struct CollapseScene {
     pub grid: CollapseGrid,
     /// The solver.
     pub solver: CollapseSolver,
+    /// The column of grains.
+    pub grains: ColumnGrainKeys,
+    /// The law of all contacts of grains.
+    pub contact: LawKeys,
+    /// Their time step.
+    #[serde(default)]
+    pub timestep: StepKeys,
+    /// What a run of grains writes.
+    #[serde(default)]
+    pub output: OutputKeys,
 }
 
 /// What the material is made of.
@@ -45,6 +60,10 @@ pub struct CollapseScene {
 pub enum CollapseModel {
     /// A μ(I) continuum with a free surface.
     Continuum,
+    /// Grains.
+    Dem,
+    /// Grains where they are needed, a continuum elsewhere.
+    Hybrid,
 }
 
 /// Side walls of a channel.
@@ -118,6 +137,19 @@ impl CollapseScene {
                 range,
             })
         };
+        match self.model {
+            CollapseModel::Hybrid => {
+                return refused(
+                    "model",
+                    "hybrid".into(),
+                    "continuum or dem: grains and a continuum are joined so far at one flat edge that stands still \
+                     (incline), and the edge of a collapse moves"
+                        .into(),
+                );
+            }
+            CollapseModel::Dem => return self.check_grains(origin),
+            CollapseModel::Continuum => {}
+        }
         let per_height = self.cells() as f64 / self.grid.length_scaled;
         let filled = per_height * per_height / self.aspect;
         if filled > LARGEST_COLUMN {

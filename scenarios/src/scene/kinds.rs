@@ -3,8 +3,8 @@
 //! A scene is a struct of keys, a recipe (`run::world::Recipe`) and a bundled file of the same name.
 
 use super::{
-    AngleOfReposeScene, BallImpactScene, BoulderScene, GrainsScene, SceneError, SiloScene,
-    TensileScene, TumblingBoxScene,
+    AngleOfReposeScene, BallImpactScene, BoulderScene, CliffScene, GrainsScene, SceneError,
+    SiloScene, TensileScene, TumblingBoxScene,
 };
 use crate::run::world::Recipe;
 use serde_json::Value;
@@ -76,6 +76,10 @@ kinds! {
     BallImpact(BallImpactScene) = "ball-impact",
     /// A lander on a bed.
     TumblingBox(TumblingBoxScene) = "tumbling-box",
+    /// A cliff that a crack brings down.
+    Cliff(CliffScene) = "cliff",
+    /// The Aswan cliff.
+    CliffAswan(CliffScene) = "cliff-aswan",
 }
 
 /// Dotted paths of files in scenes of grains; `*` stands for any name.
@@ -86,9 +90,14 @@ pub(super) fn anchor(table: &mut toml::Table, folder: &std::path::Path) {
     for path in FILES {
         anchor_at(table, path, folder);
     }
+    anchor_packing(table, "packing", folder);
+}
+
+/// Makes the path of a packing relative to a folder; its name stays a name.
+pub(super) fn anchor_packing(table: &mut toml::Table, key: &str, folder: &std::path::Path) {
     let named = |value: &toml::Value| value.as_str().is_some_and(|s| !s.ends_with(".h5"));
-    if !table.get("packing").is_some_and(named) {
-        super::layers::anchor_path(table, "packing", folder);
+    if !super::layers::get(table, key).is_some_and(named) {
+        super::layers::anchor_path(table, key, folder);
     }
 }
 

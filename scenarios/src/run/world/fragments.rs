@@ -3,7 +3,7 @@
 //! Fragments that lie on each other touch, and cohesive ones stick wherever they touch; so a fragment is what
 //! is joined by contacts of the start that have not opened.
 
-use colluvium_dem::{Partner, Simulation, Snapshot};
+use colluvium_dem::{GrainSample, Partner, Simulation, Snapshot};
 
 /// Grains that hang together.
 #[derive(Clone, Debug, PartialEq)]
@@ -18,17 +18,36 @@ pub struct Fragment {
 pub fn touching(simulation: &mut Simulation) -> Vec<[u32; 2]> {
     let mut seen = Snapshot::default();
     simulation.snapshot(&mut seen);
-    let place = places(&seen);
+    pairs(&seen, |_| true)
+}
+
+/// Pairs in contact of the grains that `f` takes, by their places in the order of numbers, each once.
+fn pairs(seen: &Snapshot, f: impl Fn(&GrainSample) -> bool) -> Vec<[u32; 2]> {
+    let place = places(seen);
+    let takes = |row: usize| f(&seen.grains[row]);
     let pair = |contact: &colluvium_dem::ContactSample| match contact.partner {
-        Partner::Grain(other) => {
+        Partner::Grain(other) if takes(contact.grain) && takes(other) => {
             let (a, b) = (place[contact.grain], place[other]);
             Some([a.min(b), a.max(b)])
         }
-        Partner::Wall(_) | Partner::Body(_) => None,
+        Partner::Grain(_) | Partner::Wall(_) | Partner::Body(_) => None,
     };
     let mut pairs: Vec<[u32; 2]> = seen.contacts.iter().filter_map(pair).collect();
     pairs.sort_unstable();
     pairs
+}
+
+/// Largest x of the surfaces of the heaviest heap of free grains that hang together by contacts (m).
+pub fn farthest(seen: &Snapshot) -> f64 {
+    let mut rows: Vec<usize> = (0..seen.grains.len()).collect();
+    rows.sort_by_key(|&i| seen.grains[i].id);
+    // Fixed grains join nothing and weigh nothing.
+    let weight = |g: &GrainSample| if g.fixed { 0.0 } else { g.mass };
+    let masses: Vec<f64> = rows.iter().map(|&i| weight(&seen.grains[i])).collect();
+    let heaps = joined(&masses, &pairs(seen, |g| !g.fixed));
+    let grains = heaps.first().map_or(&[][..], |heap| &heap.grains);
+    let reach = |&k: &usize| seen.grains[rows[k]].position.x + seen.grains[rows[k]].radius;
+    grains.iter().map(reach).fold(f64::NEG_INFINITY, f64::max)
 }
 
 /// Place of each row of a snapshot in the order of numbers.

@@ -1,0 +1,168 @@
+//! What a cliff leaves: its pile, its slope, its boulders.
+
+use crate::table::Table;
+use colluvium_dem::{Clusters, GrainSample};
+use std::f64::consts::PI;
+
+/// The pile before the foot of a cliff: where it is highest, how high, and how far it runs out.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Pile {
+    /// Where it is highest (m).
+    pub top: f64,
+    /// Height there (m).
+    pub height: f64,
+    /// Where it ends (m).
+    pub end: f64,
+    /// Slope of the straight line through it from there to its end (degrees).
+    pub slope_degrees: f64,
+}
+
+impl Pile {
+    /// Of heights (m) over places (m), beyond the foot of the cliff; none where nothing lies there.
+    pub fn of(places: &[f64], heights: &[f64], foot: f64, threshold: f64) -> Option<Pile> {
+        let first = places.partition_point(|x| *x < foot);
+        let last = (first..heights.len())
+            .rev()
+            .find(|&i| heights[i] >= threshold)?;
+        let top =
+            (first..=last).max_by(|&a, &b| heights[a].total_cmp(&heights[b]).then(b.cmp(&a)))?;
+        let end = super::super::heap::edge(places, heights, threshold);
+        let n = (last - top + 1) as f64;
+        let mean = |of: &[f64]| of[top..=last].iter().sum::<f64>() / n;
+        let (x, h) = (mean(places), mean(heights));
+        let (mut up, mut along) = (0.0, 0.0);
+        for i in top..=last {
+            up += (places[i] - x) * (heights[i] - h);
+            along += (places[i] - x).powi(2);
+        }
+        Some(Pile {
+            top: places[top],
+            height: heights[top],
+            end,
+            slope_degrees: (-up / along).atan().to_degrees(),
+        })
+    }
+
+    /// Mean angle of repose (degrees): height over run-out, both from its top (Kappel et al. 2020, §4.2).
+    pub fn repose_degrees(&self) -> f64 {
+        (self.height / (self.end - self.top)).atan().to_degrees()
+    }
+}
+
+/// How far grains have turned as a whole, forward about the axis along the cliff (degrees): the rotation that
+/// leaves the least squares between their places (x, z) before and now.
+pub fn forward_turn(before: &[[f64; 2]], now: &[[f64; 2]], weights: &[f64]) -> f64 {
+    let whole: f64 = weights.iter().sum();
+    let centre = |of: &[[f64; 2]]| {
+        let sum = of
+            .iter()
+            .zip(weights)
+            .fold([0.0; 2], |s, (x, w)| [s[0] + w * x[0], s[1] + w * x[1]]);
+        sum.map(|s| s / whole)
+    };
+    let (a, b) = (centre(before), centre(now));
+    let (mut cross, mut dot) = (0.0, 0.0);
+    for ((x, y), w) in before.iter().zip(now).zip(weights) {
+        let (p, q) = ([x[0] - a[0], x[1] - a[1]], [y[0] - b[0], y[1] - b[1]]);
+        cross += w * (p[0] * q[1] - p[1] * q[0]);
+        dot += w * (p[0] * q[0] + p[1] * q[1]);
+    }
+    // Forward is from z towards x.
+    -cross.atan2(dot).to_degrees()
+}
+
+/// Diameter of the ball that a boulder's grains fill at a solid fraction (m).
+fn bulk_diameter(volume: f64, solid_fraction: f64) -> f64 {
+    (6.0 / PI * volume / solid_fraction).cbrt()
+}
+
+/// Boulders, clusters joined by bonds, the heaviest first.
+pub fn boulders(clusters: &Clusters, solid_fraction: f64) -> Table {
+    let list: Vec<_> = clusters.boulders().collect();
+    let column = |f: &dyn Fn(&colluvium_dem::Cluster) -> f64| list.iter().map(|c| f(c)).collect();
+    Table::new("boulders")
+        .with("grains", "1", column(&|c| c.grains as f64))
+        .with("bonds", "1", column(&|c| c.bonds as f64))
+        .with("mass", "kg", column(&|c| c.mass))
+        .with(
+            "diameter",
+            "m",
+            column(&|c| bulk_diameter(c.volume, solid_fraction)),
+        )
+        .with("length", "m", column(&|c| c.extent.max()))
+        .with("x", "m", column(&|c| c.center.x))
+        .with("y", "m", column(&|c| c.center.y))
+        .with("z", "m", column(&|c| c.center.z))
+}
+
+/// Fewest sizes from which an index is told.
+const FEWEST_SIZES: usize = 10;
+
+/// Index a of a cumulative power law N(> D) ∝ D^-a of sizes, the largest likelihood's, and its standard error:
+/// `a = n/Σ ln(D_i/D_min)`, error a/√n (Hill 1975). Not a number for fewer than ten.
+pub fn size_index(sizes: &[f64]) -> [f64; 2] {
+    if sizes.len() < FEWEST_SIZES {
+        return [f64::NAN; 2];
+    }
+    let least = sizes.iter().copied().fold(f64::INFINITY, f64::min);
+    let sum: f64 = sizes.iter().map(|d| (d / least).ln()).sum();
+    let n = (sizes.len() - 1) as f64;
+    let index = n / sum;
+    [index, index / n.sqrt()]
+}
+
+/// Volume of grains that lie beyond a place along x (m³).
+pub fn volume_beyond(grains: &[GrainSample], x: f64) -> f64 {
+    let beyond = grains.iter().filter(|g| !g.fixed && g.position.x > x);
+    beyond.map(|g| 4.0 / 3.0 * PI * g.radius.powi(3)).sum()
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_pile_has_its_top_its_end_and_its_slope() {
+        let places: Vec<f64> = (0..60).map(|k| f64::from(k) - 9.5).collect();
+        // A cliff behind the foot, a pile that is highest at 5.5 m and falls by 0.4 a metre.
+        let height = |x: f64| match x {
+            x if x < 0.0 => 30.0,
+            x if x < 5.5 => 10.0 + (x - 5.5),
+            x => (10.0 - 0.4 * (x - 5.5)).max(0.0),
+        };
+        let heights: Vec<f64> = places.iter().map(|&x| height(x)).collect();
+        let pile = Pile::of(&places, &heights, 0.0, 0.2).unwrap();
+        assert_eq!((pile.top, pile.height), (5.5, 10.0));
+        assert!((pile.end - 30.0).abs() < 1e-9, "{}", pile.end);
+        assert!((pile.slope_degrees - 0.4f64.atan().to_degrees()).abs() < 1e-9);
+        assert!((pile.repose_degrees() - (10.0f64 / 24.5).atan().to_degrees()).abs() < 1e-9);
+        assert_eq!(Pile::of(&places, &[0.0; 60], 0.0, 0.2), None);
+    }
+
+    #[test]
+    fn turns_are_found_whatever_moves_along() {
+        let before = [[0.0, 0.0], [1.0, 0.3], [0.2, 2.0], [-1.0, 1.0]];
+        for degrees in [-170.0f64, -20.0, 0.0, 35.0, 90.0] {
+            let (s, c) = degrees.to_radians().sin_cos();
+            let turned = |[x, z]: [f64; 2]| [c * x + s * z + 7.0, c * z - s * x - 3.0];
+            let now = before.map(turned);
+            let found = forward_turn(&before, &now, &[1.0, 2.0, 0.5, 1.5]);
+            assert!((found - degrees).abs() < 1e-9, "{degrees} {found}");
+        }
+    }
+
+    #[test]
+    fn an_index_of_sizes_is_found_with_its_error() {
+        // Quantiles of N(> D) ∝ D^-3.6.
+        let n = 400;
+        let sizes: Vec<f64> = (0..n)
+            .map(|k| ((f64::from(k) + 0.5) / f64::from(n)).powf(-1.0 / 3.6))
+            .collect();
+        let [index, error] = size_index(&sizes);
+        assert!(
+            (index - 3.6).abs() < 2.0 * error && error < 0.2,
+            "{index} {error}"
+        );
+        assert!(size_index(&sizes[..9])[0].is_nan());
+    }
+}
