@@ -10,6 +10,7 @@
 //! c (Pa) strength, β (–) size of the contact patch. Grains with asperities of radius R_a touch there:
 //! F_c R_a/R. The thesis prints both R = r_i r_j/(r_i + r_j) and figures that fit R = r for equal
 //! grains; here R is the reduced radius throughout, as in its moments.
+//! So do Kappel et al.: their tensile strengths are those of twice the force that they print.
 //!
 //! The attraction jumps from 0 to F_c at first touch and back at the last, so an impact neither gains
 //! nor loses by it: its energy is -F_c x at an overlap x.
