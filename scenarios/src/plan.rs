@@ -26,7 +26,10 @@ pub fn plan(scene: &Scene) -> Result<String, Failure> {
     match &scene.body {
         SceneBody::Incline(body) => incline(scene, body),
         SceneBody::Bagnold(body) => bagnold(body),
-        SceneBody::Collapse(body) => Ok(collapse::collapse(body)),
+        SceneBody::Collapse(body) => {
+            let ground = run::collapse_ground::ground(body, &scene.origin)?;
+            Ok(collapse::collapse(body, ground.as_ref()))
+        }
         SceneBody::Impact(body) => impact(scene, body),
         SceneBody::Chute(body) => bed::chute(body),
         SceneBody::Settle(body) => bed::settle(body),

@@ -7,6 +7,7 @@ pub mod bed;
 mod boulder;
 pub mod chute;
 pub mod collapse;
+pub mod collapse_ground;
 mod comet;
 mod comet_block;
 pub mod energy_table;

@@ -12,6 +12,7 @@ mod boulder;
 mod check;
 mod chute;
 mod collapse;
+mod collapse_terrain;
 mod comet;
 mod error;
 mod friction_keys;
@@ -38,6 +39,7 @@ pub use chute::ChuteScene;
 pub use collapse::{
     CollapseGrid, CollapseModel, CollapseScene, CollapseSolver, CollapseWalls, ThinLayerKind,
 };
+pub use collapse_terrain::{ContactKind, TerrainKeys};
 pub use comet::{CometBlockKeys, CometKeys, MixKind, Softness};
 pub use error::SceneError;
 pub use grains::GrainsScene;
@@ -237,6 +239,10 @@ impl Scene {
             if matches!(kind, Family::Grains) {
                 kinds::anchor(&mut own, folder);
             }
+            if matches!(kind, Family::Collapse) {
+                layers::anchor_path(&mut own, "terrain.heights", folder);
+                layers::anchor_path(&mut own, "terrain.mesh", folder);
+            }
         }
         // What was written, before a file's numbers take their places.
         let mut written = own.clone();
@@ -291,6 +297,10 @@ impl Scene {
         inputs.extend(body.start_file().map(PathBuf::from));
         if let SceneBody::Grains(_) = &body {
             inputs.extend(kinds::inputs(&resolved));
+        }
+        if let SceneBody::Collapse(body) = &body {
+            let terrain = body.terrain.as_ref().and_then(TerrainKeys::file);
+            inputs.extend(terrain.map(|(_, file)| PathBuf::from(file)));
         }
         let scene = Scene {
             name,

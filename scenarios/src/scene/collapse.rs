@@ -1,6 +1,6 @@
 //! Keys of the collapse of a column.
 
-use super::{FrictionLaw, RheologyKeys, SceneError};
+use super::{FrictionLaw, RheologyKeys, SceneError, TerrainKeys};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -33,6 +33,9 @@ pub struct CollapseScene {
     /// Side walls of a narrow channel; a plane of any width without them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub side_walls: Option<CollapseWalls>,
+    /// Ground instead of a level floor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub terrain: Option<TerrainKeys>,
     /// The grid.
     pub grid: CollapseGrid,
     /// The solver.
@@ -129,6 +132,9 @@ impl CollapseScene {
                     self.scale
                 ),
             );
+        }
+        if let Some(terrain) = &self.terrain {
+            terrain.check_together(origin)?;
         }
         let r = &self.rheology;
         if let Some([low, high]) = r.valid_i.as_deref()
