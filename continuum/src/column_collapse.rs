@@ -6,6 +6,10 @@
 //! *Phys. Fluids* 17 (2005) 103302; Lube, Huppert, Sparks & Freundt, *Phys. Rev. E* 72 (2005)
 //! 041301. μ(I) continuum: Lagrée, Staron & Popinet, *J. Fluid Mech.* 686 (2011) 378.
 
+mod ground;
+
+pub use ground::CollapseGround;
+
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, require};
@@ -99,20 +103,25 @@ impl CollapseCase {
         Units::of_gravity(self.height, self.rheology.bulk_density(), self.gravity)
     }
 
-    /// The column at rest, in natural units.
-    fn flow(&self, options: &SurfaceOptions) -> Result<SurfaceFlow<MuI>, Error> {
-        let spacing = self.length_scaled / self.cells as f64;
-        let rows = (ROOM_ABOVE / spacing).ceil().max(1.0) as usize;
+    /// A grid of so many rows between smooth walls, on a rough floor.
+    fn grid(&self, spacing: f64, rows: usize) -> Result<Grid, Error> {
         let axis = |cells: usize, low| Axis::Bounded {
             length: spacing * cells as f64,
             cells,
             low,
             high: Boundary::FreeSlip,
         };
-        let grid = Grid::with_moving_surface([
+        Grid::with_moving_surface([
             axis(self.cells, Boundary::FreeSlip),
             axis(rows, Boundary::NoSlip { velocity: 0.0 }),
-        ])?;
+        ])
+    }
+
+    /// The column at rest, in natural units.
+    fn flow(&self, options: &SurfaceOptions) -> Result<SurfaceFlow<MuI>, Error> {
+        let spacing = self.length_scaled / self.cells as f64;
+        let rows = (ROOM_ABOVE / spacing).ceil().max(1.0) as usize;
+        let grid = self.grid(spacing, rows)?;
         let fractions = (0..rows)
             .flat_map(|k| (0..self.cells).map(move |i| (i, k)))
             .map(|(i, k)| self.covered(spacing, i, k))
@@ -169,6 +178,9 @@ pub struct Collapse {
     flow: SurfaceFlow<MuI>,
     rest_speed: f64,
     start_volume: f64,
+    /// Height of the lower edge of the grid (m).
+    bottom: f64,
+    ground: Option<CollapseGround>,
 }
 
 impl Collapse {
@@ -198,6 +210,39 @@ impl Collapse {
         Ok(Self::of_flow(case, options, flow))
     }
 
+    /// The column on ground instead of a level floor, with side walls or without.
+    ///
+    /// # Errors
+    /// Parameters or settings out of range, or ground that does not span the grid.
+    pub fn over_ground(
+        case: &CollapseCase,
+        options: &SurfaceOptions,
+        ground: &CollapseGround,
+        walls: Option<SideWalls>,
+    ) -> Result<Self, Error> {
+        case.validate()?;
+        let (mut flow, bottom) = case.flow_over(ground, options)?;
+        if let Some(walls) = walls {
+            walls.validate()?;
+            flow = flow.between_side_walls(walls.in_units(&case.units()))?;
+        }
+        Ok(Self {
+            bottom,
+            ground: Some(ground.clone()),
+            ..Self::of_flow(case, options, flow)
+        })
+    }
+
+    /// Heights of the ground under the columns of cells (m): zero on a level floor.
+    pub fn ground_heights(&self) -> Vec<f64> {
+        let (x, _) = self.profile();
+        let height = |x: &f64| match &self.ground {
+            None => 0.0,
+            Some(ground) => ground.profile.height_at(*x).unwrap_or(0.0),
+        };
+        x.iter().map(height).collect()
+    }
+
     fn of_flow(case: &CollapseCase, options: &SurfaceOptions, flow: SurfaceFlow<MuI>) -> Self {
         Self {
             case: *case,
@@ -205,6 +250,8 @@ impl Collapse {
             rest_speed: REST_SPEED * options.solver.strain_rate_floor,
             start_volume: flow.volume(),
             flow,
+            bottom: 0.0,
+            ground: None,
         }
     }
 
@@ -280,6 +327,10 @@ impl Collapse {
         for f in &mut fields {
             let scaled = |values: [f64; 2], unit: f64| values.map(|v| v * unit);
             (f.lower, f.upper) = (scaled(f.lower, length), scaled(f.upper, length));
+            if self.ground.is_some() {
+                f.lower[1] += self.bottom;
+                f.upper[1] += self.bottom;
+            }
             f.velocity = scaled(f.velocity, units.velocity);
             f.pressure *= units.stress();
             f.stress = scaled(f.stress, units.stress());

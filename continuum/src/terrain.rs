@@ -13,6 +13,7 @@
 
 mod profile;
 mod raster;
+mod section;
 mod surface;
 
 pub use profile::Profile;

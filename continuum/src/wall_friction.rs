@@ -115,6 +115,8 @@ pub(crate) enum PointLaw {
     OnWall(WallFriction),
     /// That of side walls; the rate is the velocity.
     SideWalls(SideWalls),
+    /// That of ground along which the material slides; the rate is the velocity, the weight an area.
+    Sliding(WallFriction),
 }
 
 /// Halvings in the search for the rate at which the material bears what the wall does.
@@ -140,6 +142,7 @@ impl PointLaw {
                 }
             }
             PointLaw::SideWalls(walls) => walls.threshold(pressure),
+            PointLaw::Sliding(ground) => ground.threshold(pressure),
         }
     }
 
@@ -161,6 +164,7 @@ impl PointLaw {
                 material.potential(ends[0], pressure) + contact * (rate - ends[0])
             }
             PointLaw::SideWalls(walls) => walls.threshold(pressure).stress * rate,
+            PointLaw::Sliding(ground) => ground.threshold(pressure).stress * rate,
         }
     }
 }
@@ -200,6 +204,7 @@ mod tests {
             PointLaw::Material,
             PointLaw::OnWall(WALL),
             PointLaw::SideWalls(side),
+            PointLaw::Sliding(WALL),
         ] {
             for rate in [0.5, 4.0, 50.0] {
                 let steps = 20_000;

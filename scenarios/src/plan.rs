@@ -29,7 +29,10 @@ pub fn plan(scene: &Scene) -> Result<String, Failure> {
         SceneBody::Collapse(body) if body.model == CollapseModel::Dem => {
             world::plan(scene, body.as_ref())
         }
-        SceneBody::Collapse(body) => Ok(collapse::collapse(body)),
+        SceneBody::Collapse(body) => {
+            let ground = run::collapse_ground::ground(body, &scene.origin)?;
+            Ok(collapse::collapse(body, ground.as_ref()))
+        }
         SceneBody::Impact(body) => impact(scene, body),
         SceneBody::Chute(body) => bed::chute(body),
         SceneBody::Settle(body) => bed::settle(body),

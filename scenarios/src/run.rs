@@ -8,6 +8,7 @@ mod boulder;
 pub mod chute;
 mod cliff;
 pub mod collapse;
+pub mod collapse_ground;
 mod column_of_grains;
 mod comet;
 mod comet_block;

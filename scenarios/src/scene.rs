@@ -14,6 +14,7 @@ mod chute;
 mod cliff;
 mod collapse;
 mod collapse_grains;
+mod collapse_terrain;
 mod comet;
 mod error;
 mod friction_keys;
@@ -42,6 +43,7 @@ pub use collapse::{
     CollapseGrid, CollapseModel, CollapseScene, CollapseSolver, CollapseWalls, ThinLayerKind,
 };
 pub use collapse_grains::{CalibratedKind, ColumnFloorKind, ColumnGrainKeys};
+pub use collapse_terrain::{ContactKind, TerrainKeys};
 pub use comet::{CometBlockKeys, CometKeys, MixKind, Softness};
 pub use error::SceneError;
 pub use grains::GrainsScene;
@@ -247,6 +249,8 @@ impl Scene {
             }
             if matches!(kind, Family::Collapse) {
                 kinds::anchor_packing(&mut own, "grains.packing", folder);
+                layers::anchor_path(&mut own, "terrain.heights", folder);
+                layers::anchor_path(&mut own, "terrain.mesh", folder);
             }
         }
         // What was written, before a file's numbers take their places.
@@ -307,6 +311,10 @@ impl Scene {
                 inputs.extend(packing.filter(|s| s.ends_with(".h5")).map(PathBuf::from));
             }
             _ => {}
+        }
+        if let SceneBody::Collapse(body) = &body {
+            let terrain = body.terrain.as_ref().and_then(TerrainKeys::file);
+            inputs.extend(terrain.map(|(_, file)| PathBuf::from(file)));
         }
         let scene = Scene {
             name,

@@ -311,3 +311,130 @@ fn bad_collapses_are_refused_by_key() {
         assert!(!folder.path().join("x").exists());
     }
 }
+
+/// A column on a plateau runs over its edge: the same bits with one thread and two and after a stop, and
+/// by points, a raster and a mesh of the same ground.
+#[test]
+fn collapse_on_terrain() {
+    let folder = tempfile::tempdir().unwrap();
+    let heights = [1.0, 1.0, 1.0, 0.875, 0.625, 0.25, 0.125, 0.0, 0.0];
+    let spacing = 0.5;
+    let points: Vec<String> = heights
+        .iter()
+        .enumerate()
+        .map(|(n, z)| format!("[{:?},{z:?}]", n as f64 * spacing))
+        .collect();
+    let row = heights.map(|z| z.to_string()).join(" ");
+    let raster = format!(
+        "ncols 9\nnrows 2\nxllcenter 100\nyllcenter 50\ncellsize {spacing}\n{row}\n{row}\n"
+    );
+    std::fs::write(folder.path().join("hill.asc"), raster).unwrap();
+    let mut mesh = String::new();
+    for (n, z) in heights.iter().enumerate() {
+        let x = n as f64 * spacing;
+        mesh += &format!("v {x} -1 {z}\nv {x} 1 {z}\n");
+    }
+    for n in 0..heights.len() - 1 {
+        let [a, b, c, d] = [1, 3, 4, 2].map(|k| 2 * n + k);
+        mesh += &format!("f {a} {b} {c}\nf {a} {c} {d}\n");
+    }
+    std::fs::write(folder.path().join("hill.obj"), mesh).unwrap();
+    let profile = format!("terrain={{profile=[{}]}}", points.join(","));
+    let run = |out: &str, terrain: &str, threads: &str| {
+        let mut list = vec!["run", "column-collapse", "--out", out, "--threads", threads];
+        for set in [
+            "aspect=1.0",
+            "grid.cells=40",
+            "grid.length_scaled=4.0",
+            "duration_scaled=3.0",
+        ] {
+            list.extend(["--set", set]);
+        }
+        list.extend(["--set", terrain]);
+        succeed(folder.path(), &list);
+        summary(&folder.path().join(out))["state_hash"].clone()
+    };
+    let points = run("points", &profile, "1");
+    assert_eq!(points, run("two", &profile, "2"));
+    let file = "terrain={heights=\"hill.asc\",start=[100.0,50.2]}";
+    assert_eq!(points, run("raster", file, "1"));
+    run("mesh", "terrain={mesh=\"hill.obj\",start=[0.0,0.3]}", "1");
+    // Triangles put more points on the same line.
+    let front = |out: &str| value(&summary(&folder.path().join(out)), "x_front");
+    assert!((front("mesh") / front("points") - 1.0).abs() < 1e-3);
+    let out = folder.path().join("points");
+    let summary = summary(&out);
+    assert!(summary["ledger"]["mass_relative"].as_f64().unwrap().abs() < 1e-12);
+    let (header, deposit) = table(&out.join("deposit.csv"));
+    assert_eq!(header, ["x", "h", "z_ground"]);
+    assert!((deposit[0][2] - 1.0).abs() < 1e-12 && deposit[39][2].abs() < 0.1);
+    let report = std::fs::read_to_string(out.join("report.html")).unwrap();
+    assert!(report.contains("ground") && report.contains("height z [m]"));
+    let planned = colluvium(
+        folder.path(),
+        &[
+            "plan",
+            "column-collapse",
+            "--set",
+            &profile,
+            "--set",
+            "grid.length_scaled=4.0",
+        ],
+    );
+    let planned = String::from_utf8_lossy(&planned.stdout).into_owned();
+    assert!(
+        planned.contains("terrain") && planned.contains("9 points"),
+        "{planned}"
+    );
+}
+
+#[test]
+fn bad_terrain_is_refused_by_key() {
+    let folder = tempfile::tempdir().unwrap();
+    std::fs::write(folder.path().join("flat.asc"), "ncols 2\n").unwrap();
+    for (set, key, allowed) in [
+        ("terrain={}", "terrain.profile", "terrain.mesh"),
+        ("terrain={profile=[[0.0,0.0]]}", "terrain.profile", "2"),
+        (
+            "terrain={profile=[[0.0,0.0],[2.0,0.0]]}",
+            "terrain.profile",
+            "ground at all x",
+        ),
+        (
+            "terrain={profile=[[0.0,0.0],[9.0,0.0]],mesh=\"a.stl\"}",
+            "terrain.mesh",
+            "only one of",
+        ),
+        (
+            "terrain={profile=[[0.0,0.0],[9.0,0.0]],friction=0.3}",
+            "terrain.friction",
+            "coulomb",
+        ),
+        (
+            "terrain={profile=[[0.0,0.0],[9.0,0.0]],contact=\"coulomb\"}",
+            "terrain.friction",
+            "coefficient",
+        ),
+        (
+            "terrain={heights=\"none.asc\"}",
+            "terrain.heights",
+            "none.asc",
+        ),
+        (
+            "terrain={heights=\"flat.asc\"}",
+            "terrain.heights",
+            "flat.asc",
+        ),
+        ("terrain={mesh=\"a.txt\"}", "terrain.mesh", "stl"),
+    ] {
+        let arguments = ["run", "column-collapse", "--out", "x", "--set", set];
+        let refused = colluvium(folder.path(), &arguments);
+        assert_eq!(refused.status.code(), Some(2), "{set}");
+        let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert!(
+            message.contains(key) && message.contains(allowed),
+            "{set}: {message}"
+        );
+        assert!(!folder.path().join("x").exists());
+    }
+}

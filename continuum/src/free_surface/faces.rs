@@ -31,6 +31,8 @@ pub(crate) enum Face {
     Own(usize),
     /// It moves with an unknown of another face.
     Follows(usize),
+    /// It moves with an unknown of the other component, as a thin layer does along a slope.
+    Slides(usize),
     /// It stands still: a wall, or a layer stuck to one.
     Still,
     /// It flies freely, or there is no material near.
@@ -42,7 +44,7 @@ impl Face {
     pub(crate) fn unknown(self) -> Option<usize> {
         match self {
             Face::Own(j) | Face::Follows(j) => Some(j),
-            Face::Still | Face::Loose => None,
+            Face::Slides(_) | Face::Still | Face::Loose => None,
         }
     }
 }
@@ -50,7 +52,7 @@ impl Face {
 /// Cells fuller than this are active.
 pub(crate) const ACTIVE: f64 = 0.5;
 /// Layers thinner than this part of a cell stick to a rough wall.
-const THINNEST_LAYER: f64 = 1e-3;
+pub(super) const THINNEST_LAYER: f64 = 1e-3;
 
 /// Roles of cells and faces.
 #[derive(Debug, Clone, Default)]
@@ -65,7 +67,9 @@ pub(crate) struct Faces {
     pub own: Vec<(usize, usize)>,
     /// Whether an unknown velocity belongs to a thin layer on a wall.
     pub is_thin: Vec<bool>,
-    acceleration: [f64; DIMENSIONS],
+    /// Over ground: velocity of each face, and of the edge across it, over the unknown that moves it.
+    pub shares: Option<[Vec<[f64; 2]>; DIMENSIONS]>,
+    pub(super) acceleration: [f64; DIMENSIONS],
 }
 
 impl Faces {
@@ -139,7 +143,7 @@ impl Faces {
     }
 
     /// The unknown of the nearest face that has one, the direction into the material first.
-    fn host(
+    pub(super) fn host(
         &self,
         topology: &Topology,
         fractions: &[f64],
@@ -208,8 +212,31 @@ impl Faces {
             })
     }
 
+    /// Velocity on a face over the unknown that moves it.
+    #[inline]
+    pub(crate) fn share(&self, component: usize, face: usize) -> f64 {
+        match &self.shares {
+            None => 1.0,
+            Some(shares) => shares[component][face][0],
+        }
+    }
+
     /// Gives every face that follows the velocity of its unknown.
     pub(crate) fn spread(&self, unknowns: &[f64], velocity: &mut Velocity) {
+        if let Some(shares) = &self.shares {
+            for ((roles, shares), u) in self.role.iter().zip(shares).zip(velocity) {
+                for ((role, [share, _]), u) in roles.iter().zip(shares).zip(u) {
+                    match role {
+                        Face::Own(j) | Face::Follows(j) | Face::Slides(j) => {
+                            *u = share * unknowns[*j];
+                        }
+                        Face::Still => *u = 0.0,
+                        Face::Loose => {}
+                    }
+                }
+            }
+            return;
+        }
         for (role, u) in self.role.iter().zip(velocity) {
             for (role, u) in role.iter().zip(u) {
                 match role.unknown() {

@@ -9,6 +9,9 @@ use serde::{Deserialize, Serialize};
 
 use super::faces::{ACTIVE, Face, Faces, ThinLayer};
 use super::fraction::reconstruct;
+use super::ground::contact::sliding_place;
+use super::ground::faces::faces_over;
+use super::ground::{Contact, DUST, Ground, Terrain};
 use super::operators::{Material, Operators, POINTS};
 use super::plane::Plane;
 use super::topology::{NONE, Topology};
@@ -119,6 +122,8 @@ const INACTIVE: f64 = -1.0;
 const MAX_CUTS: usize = 8;
 /// First step from rest, over the time of free fall through a cell.
 const FIRST_STEP: f64 = 0.2;
+/// Cells over ground that miss less of being full count as full.
+const FULL_TO: f64 = 1e-11;
 
 /// State of a flow with a moving surface, on all of its grid.
 #[derive(Debug, Clone, PartialEq, Default)]
@@ -129,7 +134,8 @@ pub struct SurfaceState {
     pub velocity: [Vec<f64>; DIMENSIONS],
     /// Pressure of each cell, negative where there is none.
     pub pressure: Vec<f64>,
-    /// Stress at each corner of each cell, then the traction of side walls there if there are any.
+    /// Stress at each corner of each cell, then the traction of side walls there if there are any, then
+    /// that of ground in each cell under Coulomb friction.
     pub stress: Vec<[f64; COMPONENTS]>,
     /// Time of the fractions.
     pub time: f64,
@@ -153,6 +159,9 @@ pub struct SurfaceFlow<R> {
     planes: Vec<Option<Plane>>,
     transport: Transport,
     side_walls: Option<SideWalls>,
+    ground: Option<Ground>,
+    /// Matter and ground together.
+    filled: Vec<f64>,
     solver: Option<(Vec<usize>, PrimalDual)>,
     unknowns: FlowState,
     momentum: Vec<f64>,
@@ -200,6 +209,8 @@ impl<R: Rheology> SurfaceFlow<R> {
             planes: Vec::new(),
             transport: Transport::default(),
             side_walls: None,
+            ground: None,
+            filled: Vec::new(),
             solver: None,
             unknowns: FlowState {
                 u: Vec::new(),
@@ -217,6 +228,70 @@ impl<R: Rheology> SurfaceFlow<R> {
         })
     }
 
+    /// Material at rest over ground, in natural units. Fractions are of whole cells, and at most what the
+    /// ground leaves free of each.
+    ///
+    /// # Errors
+    /// Settings out of range, or ground that does not span the grid.
+    pub fn over_ground(
+        grid: Grid,
+        terrain: &Terrain,
+        fractions: Vec<f64>,
+        rheology: R,
+        acceleration: [f64; DIMENSIONS],
+        options: SurfaceOptions,
+    ) -> Result<Self, Error> {
+        let topology = Topology::rising(&grid, terrain.rise);
+        let ground = Ground::new(&grid, &topology, terrain)?;
+        let mut flow = Self::at_rest(grid, fractions, rheology, acceleration, options)?;
+        let full = flow.state.fractions.iter_mut().zip(&ground.free);
+        for (fraction, free) in full {
+            *fraction = fraction.min(*free);
+            // Full but for the round-off of the two ways to the same number.
+            if free - *fraction < FULL_TO {
+                *fraction = *free;
+            }
+        }
+        if let Contact::Coulomb(_) = terrain.contact {
+            let cells = topology.cells();
+            let points = sliding_place(cells, cells);
+            flow.state.stress.resize(points, [0.0; COMPONENTS]);
+        }
+        flow.topology = topology;
+        flow.set_weight_for_pressure();
+        flow.saved.clone_from(&flow.state);
+        flow.ground = Some(ground);
+        Ok(flow)
+    }
+
+    /// Starts with the pressure of the weight of what lies above, which is exact under level surfaces.
+    fn set_weight_for_pressure(&mut self) {
+        let axis = DIMENSIONS - 1;
+        let per_cell = -self.acceleration[axis] * self.grid.axes()[axis].spacing();
+        if per_cell <= 0.0 {
+            return;
+        }
+        let fractions = &self.state.fractions;
+        for cell in (0..self.topology.cells()).rev() {
+            let above = self.topology.cell_neighbours[cell][axis][1];
+            if fractions[cell] > 0.0 {
+                let load = match above {
+                    NONE => 0.0,
+                    above if fractions[above] > 0.0 => {
+                        self.state.pressure[above] + 0.5 * per_cell * fractions[above].max(0.0)
+                    }
+                    _ => 0.0,
+                };
+                self.state.pressure[cell] = load + 0.5 * per_cell * fractions[cell];
+            }
+        }
+    }
+
+    /// Part of each cell that is free of ground.
+    pub fn free_parts(&self) -> Option<&[f64]> {
+        self.ground.as_ref().map(|ground| ground.free.as_slice())
+    }
+
     /// The same flow between side walls at a distance along y, in natural units: they rub on what
     /// moves with 2 c/W + (2 μ/W) p per volume.
     ///
@@ -226,6 +301,7 @@ impl<R: Rheology> SurfaceFlow<R> {
         walls.validate()?;
         self.side_walls = Some(walls);
         let points = 2 * self.topology.cells() * POINTS;
+        let points = points.max(self.state.stress.len());
         self.state.stress.resize(points, [0.0; COMPONENTS]);
         self.saved.clone_from(&self.state);
         Ok(self)
@@ -437,8 +513,15 @@ impl<R: Rheology> SurfaceFlow<R> {
             order.reverse();
         }
         let incompressible: Vec<bool> = (0..self.topology.cells())
-            .map(|cell| {
-                self.state.fractions[cell] > ACTIVE && self.divergence(cell).abs() < DILATES
+            .map(|cell| match &self.ground {
+                None => {
+                    self.state.fractions[cell] > ACTIVE && self.divergence(cell).abs() < DILATES
+                }
+                Some(ground) => {
+                    let fraction = self.state.fractions[cell];
+                    fraction > ACTIVE * ground.free[cell]
+                        && self.divergence_over(ground, cell).abs() < DILATES
+                }
             })
             .collect();
         let passes = (dt * self.largest_rate() / LONGEST_PASS).ceil().max(1.0);
@@ -449,6 +532,7 @@ impl<R: Rheology> SurfaceFlow<R> {
                 courant: std::array::from_fn(|axis| dt / (passes * axes[axis].spacing())),
                 order: &order,
                 incompressible: &incompressible,
+                ground: self.ground.as_ref(),
             },
             &mut self.state.fractions,
             &mut self.state.velocity,
@@ -468,30 +552,68 @@ impl<R: Rheology> SurfaceFlow<R> {
         sum
     }
 
+    /// Flux out of the cells that share a pressure with one, per volume of a whole cell.
+    fn divergence_over(&self, ground: &Ground, cell: usize) -> f64 {
+        let master = match ground.master[cell] {
+            NONE => return 0.0,
+            master => master,
+        };
+        let mut sum = 0.0;
+        for member in std::iter::once(master).chain(ground.parts_of(master)) {
+            for axis in 0..DIMENSIONS {
+                let [low, high] = self.topology.cell_faces[member][axis];
+                let through =
+                    |face: usize| self.state.velocity[axis][face] * ground.aperture[axis][face];
+                sum += (through(high) - through(low)) / self.grid.axes()[axis].spacing();
+            }
+        }
+        sum
+    }
+
     /// Moves the velocity on by `dt` under gravity, pressure and stress.
     fn accelerate(&mut self, dt: f64, record: &mut SurfaceStep) -> Result<bool, Error> {
         let clock = std::time::Instant::now();
-        reconstruct(&self.topology, &self.state.fractions, &mut self.planes);
-        let faces = Faces::of(
-            &self.grid,
-            &self.topology,
-            &self.state.fractions,
-            self.acceleration,
-            self.options.thin_layer,
-        );
-        let Operators {
-            discretisation,
-            places,
-        } = Material {
+        let fractions = &self.state.fractions;
+        let (acceleration, thin_layer) = (self.acceleration, self.options.thin_layer);
+        let faces = match &self.ground {
+            None => {
+                reconstruct(&self.topology, fractions, &mut self.planes);
+                Faces::of(
+                    &self.grid,
+                    &self.topology,
+                    fractions,
+                    acceleration,
+                    thin_layer,
+                )
+            }
+            Some(ground) => {
+                ground.fill(fractions, &mut self.filled);
+                reconstruct(&self.topology, &self.filled, &mut self.planes);
+                // Nor has the surface of matter a plane where there is only ground.
+                for (plane, fraction) in self.planes.iter_mut().zip(fractions) {
+                    if *fraction <= DUST {
+                        *plane = None;
+                    }
+                }
+                faces_over(ground, &self.topology, fractions, acceleration, thin_layer)
+            }
+        };
+        let material = Material {
             grid: &self.grid,
             topology: &self.topology,
-            fractions: &self.state.fractions,
+            fractions,
             planes: &self.planes,
             faces: &faces,
             side_walls: self.side_walls,
-            acceleration: self.acceleration,
-        }
-        .operators();
+            acceleration,
+        };
+        let Operators {
+            discretisation,
+            places,
+        } = match &self.ground {
+            None => material.operators(),
+            Some(ground) => material.operators_over(ground),
+        };
         self.gather(&faces, &places);
         if self.falls_freely(&discretisation, dt) {
             self.spent.operators += clock.elapsed().as_secs_f64();
@@ -540,7 +662,8 @@ impl<R: Rheology> SurfaceFlow<R> {
     /// solution: makes it, to the last bit, and says so.
     fn falls_freely(&mut self, discretisation: &Discretisation, dt: f64) -> bool {
         let unknowns = &mut self.unknowns;
-        let is_loose = unknowns.p.iter().all(|p| *p <= f64::MIN_POSITIVE)
+        let is_loose = self.ground.is_none()
+            && unknowns.p.iter().all(|p| *p <= f64::MIN_POSITIVE)
             && unknowns.s.iter().all(|s| *s == [0.0; COMPONENTS])
             && self.rheology.threshold(1.0, 0.0).stress == 0.0
             && self
@@ -578,7 +701,7 @@ impl<R: Rheology> SurfaceFlow<R> {
             for (face, role) in faces.role[c].iter().enumerate() {
                 if let Some(j) = role.unknown() {
                     let mass = self.topology.face_mean(c, face, &self.state.fractions);
-                    self.momentum[j] += mass;
+                    self.momentum[j] += mass * faces.share(c, face);
                     self.unknowns.u[j] += mass * self.state.velocity[c][face];
                 }
             }

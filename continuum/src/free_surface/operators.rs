@@ -19,9 +19,9 @@ use crate::wall_friction::{PointLaw, SideWalls};
 /// Smallest θ in the pressure gradient and in the pressure at walls.
 const NEAREST_SURFACE: f64 = 0.005;
 /// Smallest θ in the extrapolation of pressure beyond the surface.
-const NEAREST_EXTRAPOLATION: f64 = 0.25;
+pub(super) const NEAREST_EXTRAPOLATION: f64 = 0.25;
 /// Cells with less material have no quadrature points.
-const EMPTY: f64 = 1e-9;
+pub(super) const EMPTY: f64 = 1e-9;
 /// Most quadrature points of a cell: fewer along flat axes.
 pub(crate) const POINTS: usize = 1 << DIMENSIONS;
 
@@ -70,7 +70,7 @@ impl Material<'_> {
     }
 
     /// Where the unknowns are, in half cells.
-    fn places(&self) -> Vec<Place> {
+    pub(super) fn places(&self) -> Vec<Place> {
         let velocities = self.faces.own.iter().map(|&(component, face)| {
             let width = self.grid.faces(component)[0];
             let mut place = [2 * (face % width) as u32, 2 * (face / width) as u32];
@@ -86,7 +86,7 @@ impl Material<'_> {
     }
 
     /// Mass of each unknown, followers included.
-    fn masses(&self) -> Vec<f64> {
+    pub(super) fn masses(&self) -> Vec<f64> {
         let mut mass = vec![0.0; self.faces.own.len()];
         let volume = self.grid.cell_volume();
         for (component, roles) in self.faces.role.iter().enumerate() {
@@ -101,7 +101,13 @@ impl Material<'_> {
 
     /// Distance θ, in cells, from the centre of an active cell to the surface on the way to its
     /// inactive neighbour along an axis.
-    fn surface_distance(&self, active: usize, other: usize, axis: usize, side: usize) -> f64 {
+    pub(super) fn surface_distance(
+        &self,
+        active: usize,
+        other: usize,
+        axis: usize,
+        side: usize,
+    ) -> f64 {
         let mut step = [0.0; DIMENSIONS];
         step[axis] = if side == 1 { 1.0 } else { -1.0 };
         let back = step.map(|s| -s);
@@ -176,7 +182,7 @@ impl Material<'_> {
         let face = index[0] + self.grid.faces(component)[0] * index[1];
         match self.faces.role[component][face] {
             Face::Own(j) | Face::Follows(j) => VelocityAt::Unknown(j),
-            Face::Still => VelocityAt::Zero,
+            Face::Slides(_) | Face::Still => VelocityAt::Zero,
             Face::Loose => VelocityAt::Nowhere,
         }
     }
@@ -338,7 +344,7 @@ impl Material<'_> {
 
     /// The pressure at the centre of a cell as an active cell times a factor: its own, or one
     /// extrapolated through the surface.
-    fn pressure_at(&self, cell: usize, nearest: f64) -> Option<(usize, f64)> {
+    pub(super) fn pressure_at(&self, cell: usize, nearest: f64) -> Option<(usize, f64)> {
         if self.faces.pressure[cell] != NONE {
             return Some((self.faces.pressure[cell], 1.0));
         }

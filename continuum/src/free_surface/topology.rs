@@ -50,14 +50,34 @@ fn beside(axis: &Axis, position: usize, count: usize) -> [Option<usize>; 2] {
 
 impl Topology {
     pub(crate) fn new(grid: &Grid) -> Self {
+        Self::rising(grid, 0)
+    }
+
+    /// A grid whose periodic axis x meets itself so many cells higher up. Rows close on themselves
+    /// for it, the lowest below the highest: ground below and room above keep them apart.
+    pub(crate) fn rising(grid: &Grid, rise: usize) -> Self {
         let axes = grid.axes();
         let cells: [usize; DIMENSIONS] = std::array::from_fn(|axis| axes[axis].cells());
+        // A step along x beyond an end of the period, and the row that it leads to.
+        let shifted = |row: usize, from: usize, to: usize, count: usize, rows: usize| {
+            let is_over = rise > 0 && count > 2;
+            if is_over && from + 1 == count && to == 0 {
+                (row + rows - rise % rows) % rows
+            } else if is_over && from == 0 && to + 1 == count {
+                (row + rise) % rows
+            } else {
+                row
+            }
+        };
         let replaced = |index: [usize; DIMENSIONS],
                         axis: usize,
                         position: Option<usize>,
                         counts: [usize; DIMENSIONS]| {
             position.map_or(NONE, |position| {
                 let mut index = index;
+                if axis == 0 {
+                    index[1] = shifted(index[1], index[0], position, counts[0], counts[1]);
+                }
                 index[axis] = position;
                 flatten(index, counts)
             })

@@ -12,6 +12,7 @@
 
 use super::faces::ACTIVE;
 use super::fraction::{reconstruct, volume_in};
+use super::ground::Ground;
 use super::plane::Plane;
 use super::topology::{NONE, Topology};
 use crate::grid::DIMENSIONS;
@@ -33,6 +34,8 @@ pub(crate) struct Transport {
     /// Cells that keep their dilatation in the sweeps of a part.
     dilates: Vec<bool>,
     next: Vec<f64>,
+    /// Matter and ground together.
+    filled: Vec<f64>,
     start: Velocity,
     /// Momentum of each velocity of a component.
     momentum: Vec<f64>,
@@ -49,6 +52,18 @@ pub(crate) struct Motion<'a> {
     pub order: &'a [usize],
     /// Cells without divergence.
     pub incompressible: &'a [bool],
+    /// Ground that cuts cells and faces.
+    pub ground: Option<&'a Ground>,
+}
+
+impl Motion<'_> {
+    /// Whether more than half of what is free of a cell is filled.
+    fn is_active(&self, cell: usize, fraction: f64) -> bool {
+        match self.ground {
+            None => fraction > ACTIVE,
+            Some(ground) => fraction > ACTIVE * ground.free[cell],
+        }
+    }
 }
 
 impl Transport {
@@ -69,18 +84,64 @@ impl Transport {
         self.total_dilatation.clear();
         self.total_dilatation.resize(fractions.len(), 0.0);
         self.dilates.clear();
-        let full = fractions.iter().zip(motion.incompressible);
-        self.dilates
-            .extend(full.map(|(f, incompressible)| *incompressible && *f > ACTIVE));
+        let full = fractions.iter().zip(motion.incompressible).enumerate();
+        self.dilates.extend(
+            full.map(|(cell, (f, incompressible))| *incompressible && motion.is_active(cell, *f)),
+        );
         for (nth, &axis) in motion.order.iter().enumerate() {
-            reconstruct(motion.topology, fractions, &mut self.planes);
-            self.volume_fluxes(motion, fractions, axis);
+            match motion.ground {
+                None => {
+                    reconstruct(motion.topology, fractions, &mut self.planes);
+                    self.volume_fluxes(motion, fractions, axis);
+                }
+                Some(ground) => {
+                    ground.fill(fractions, &mut self.filled);
+                    reconstruct(motion.topology, &self.filled, &mut self.planes);
+                    self.volume_fluxes_over(motion, ground, fractions, axis);
+                }
+            }
             self.update_fractions(motion, fractions, axis, nth + 1 == motion.order.len());
             for component in 0..DIMENSIONS {
                 self.move_momentum(motion, fractions, velocity, axis, component);
             }
             std::mem::swap(fractions, &mut self.next);
         }
+        if let Some(ground) = motion.ground {
+            ground.settle(motion.topology, fractions);
+        }
+    }
+
+    /// Volume through the free parts of faces.
+    fn volume_fluxes_over(
+        &mut self,
+        motion: &Motion<'_>,
+        ground: &Ground,
+        fractions: &[f64],
+        axis: usize,
+    ) {
+        let (planes, start) = (&self.planes, &self.start[axis]);
+        let topology = motion.topology;
+        let flux = |face: usize| {
+            let ([low, high], u) = (topology.face_cells[axis][face], start[face]);
+            let aperture = ground.aperture[axis][face];
+            let length = u * motion.courant[axis];
+            if low == NONE || high == NONE || length == 0.0 || aperture == 0.0 {
+                return 0.0;
+            }
+            let (mut from, mut to) = ([0.0; 3], [1.0; 3]);
+            let donor = if length > 0.0 {
+                from[axis] = (1.0 - length).max(0.0);
+                low
+            } else {
+                to[axis] = (-length).min(1.0);
+                high
+            };
+            let share = ground.matter(donor, fractions[donor], planes[donor].as_ref(), from, to);
+            (aperture * length.abs() * share).clamp(0.0, fractions[donor].max(0.0))
+                * length.signum()
+        };
+        self.fluxes.clear();
+        self.fluxes.extend((0..topology.faces(axis)).map(flux));
     }
 
     fn volume_fluxes(&mut self, motion: &Motion<'_>, fractions: &[f64], axis: usize) {
@@ -128,6 +189,9 @@ impl Transport {
                 0.0
             } else if is_last {
                 -self.total_dilatation[cell]
+            } else if let Some(ground) = motion.ground {
+                let through = |face: usize| self.start[axis][face] * ground.aperture[axis][face];
+                (through(high) - through(low)) * motion.courant[axis]
             } else {
                 (self.start[axis][high] - self.start[axis][low]) * motion.courant[axis]
             };

@@ -59,6 +59,63 @@ impl Profile {
         &self.points
     }
 
+    /// Area of ground in a box (m²).
+    pub fn area_in(&self, low: [f64; 2], high: [f64; 2]) -> f64 {
+        let mut sum = 0.0;
+        for piece in self.points.windows(2) {
+            let (from, to) = (piece[0], piece[1]);
+            let (left, right) = if to[0] >= from[0] {
+                (from, to)
+            } else {
+                (to, from)
+            };
+            let (a, b) = (left[0].max(low[0]), right[0].min(high[0]));
+            if b <= a {
+                continue;
+            }
+            let slope = (right[1] - left[1]) / (right[0] - left[0]);
+            let [ha, hb] = [a, b].map(|x| left[1] + slope * (x - left[0]));
+            let below = |z: f64| area_below(a, b, ha, hb, z);
+            sum += if to[0] > from[0] { 1.0 } else { -1.0 } * (below(low[1]) - below(high[1]));
+        }
+        sum
+    }
+
+    /// Height of the highest ground at x (m), if there is ground.
+    pub fn height_at(&self, x: f64) -> Option<f64> {
+        let pieces = self.points.windows(2).filter_map(|piece| {
+            let (from, to) = (piece[0], piece[1]);
+            let (low, high) = (from[0].min(to[0]), from[0].max(to[0]));
+            if x < low || x > high {
+                None
+            } else if low == high {
+                Some(from[1].max(to[1]))
+            } else {
+                Some(from[1] + (to[1] - from[1]) * (x - from[0]) / (to[0] - from[0]))
+            }
+        });
+        pieces.fold(None, |most: Option<f64>, z| {
+            Some(most.map_or(z, |m| m.max(z)))
+        })
+    }
+
+    /// Distance of a point from the line (m).
+    pub fn distance(&self, point: [f64; 2]) -> f64 {
+        let pieces = self.points.windows(2).map(|piece| {
+            let (from, to) = (piece[0], piece[1]);
+            let along = [to[0] - from[0], to[1] - from[1]];
+            let away = [point[0] - from[0], point[1] - from[1]];
+            let square = along[0] * along[0] + along[1] * along[1];
+            let share = if square > 0.0 {
+                ((away[0] * along[0] + away[1] * along[1]) / square).clamp(0.0, 1.0)
+            } else {
+                0.0
+            };
+            (away[0] - share * along[0]).hypot(away[1] - share * along[1])
+        });
+        pieces.fold(f64::INFINITY, f64::min)
+    }
+
     /// How the ground cuts the cells of a grid, which it has to span along x.
     ///
     /// # Errors

@@ -3,8 +3,11 @@
 use super::Lines;
 use crate::run;
 use crate::scene::CollapseScene;
+use colluvium_continuum::column_collapse::CollapseGround;
+use colluvium_continuum::free_surface::Contact;
 
-pub(super) fn collapse(body: &CollapseScene) -> String {
+/// The plan, with the ground that the scene describes if it has any.
+pub(super) fn collapse(body: &CollapseScene, ground: Option<&CollapseGround>) -> String {
     let mut lines = Lines::default();
     let case = run::collapse::case(body);
     let units = case.units();
@@ -14,13 +17,35 @@ pub(super) fn collapse(body: &CollapseScene) -> String {
         "scene",
         &format!(
             "column-collapse: a column {} m high and {:.4} m wide, its face leaning out by {} degrees, beside a plane of symmetry, \
-             on a rough floor",
+             on {}",
             body.height,
             case.width(),
-            body.overhang_degrees
+            body.overhang_degrees,
+            if ground.is_some() { "terrain" } else { "a rough floor" }
         ),
     );
     lines.say_rheology(&body.rheology);
+    if let Some(ground) = ground {
+        let length = body.grid.length_scaled * body.height;
+        let [low, high] = ground.span(length);
+        let contact = match ground.contact {
+            Contact::NoSlip => "material at it stands still".to_owned(),
+            Contact::FreeSlip => "material slides on it freely".to_owned(),
+            Contact::Coulomb(friction) => {
+                format!(
+                    "material slides on it under friction coefficient {}",
+                    friction.friction
+                )
+            }
+        };
+        lines.say(
+            "terrain",
+            &format!(
+                "a line of {} points, {low:.4} to {high:.4} m high; it cuts the cells of the grid; {contact}; layers thinner than half a cell slide as blocks with the slope",
+                ground.profile.points().len()
+            ),
+        );
+    }
     if let Some(walls) = &body.side_walls {
         lines.say(
             "side walls",

@@ -3,7 +3,7 @@
 mod beside_continuum;
 
 use super::bagnold::failure;
-use super::{Findings, Under, world};
+use super::{Findings, Under, collapse_ground, world};
 use crate::cost::Cost;
 use crate::failure::Failure;
 use crate::frames;
@@ -84,12 +84,30 @@ pub(super) fn check(scene: &Scene, body: &CollapseScene) -> Result<(), Failure> 
     let named =
         |error: colluvium_continuum::Error| Failure::Input(format!("{}: {error}", scene.origin));
     case(body).validate().map_err(named)?;
-    options(body).validate().map_err(named)
+    options(body).validate().map_err(named)?;
+    // Ground shows whether it fits when the grid is cut.
+    if body.terrain.is_some() {
+        begun(body, &scene.origin)?;
+    }
+    Ok(())
+}
+
+/// The column before it is let go.
+fn begun(scene: &CollapseScene, origin: &str) -> Result<Collapse, Failure> {
+    let (case, options, walls) = (case(scene), options(scene), walls(scene));
+    match (collapse_ground::ground(scene, origin)?, walls) {
+        (Some(ground), walls) => Collapse::over_ground(&case, &options, &ground, walls),
+        (None, None) => Collapse::new(&case, &options),
+        (None, Some(walls)) => Collapse::between_side_walls(&case, &options, walls),
+    }
+    .map_err(|error| Failure::Input(format!("{origin}: {error}")))
 }
 
 /// What was found on the way, beside the state.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Course {
+    /// Heights of the ground under the columns of cells; none on a level floor.
+    ground: Vec<f64>,
     fronts: Vec<Front>,
     /// Time, position and height, row by row.
     profiles: [Vec<f64>; 3],
@@ -147,6 +165,9 @@ impl Course {
             record.numbers.insert(name.to_owned(), values);
         };
         put("fractions", state.fractions.clone());
+        if !self.ground.is_empty() {
+            put("ground", self.ground.clone());
+        }
         put("velocity/x", state.velocity[0].clone());
         put("velocity/z", state.velocity[1].clone());
         put("pressure", state.pressure.clone());
@@ -198,6 +219,7 @@ impl Course {
         };
         let step = numbers("course/step")?;
         let course = Course {
+            ground: numbers("ground").unwrap_or_default(),
             fronts: fronts
                 .chunks_exact(3)
                 .map(|f| Front {
@@ -231,19 +253,23 @@ pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, 
         beside_continuum::set_beside(scene, &mut findings, under)?;
         return Ok(findings);
     }
-    let mut collapse = match walls(scene) {
-        None => Collapse::new(&case(scene), &options(scene)),
-        Some(walls) => Collapse::between_side_walls(&case(scene), &options(scene), walls),
-    }
-    .map_err(failure)?;
+    let mut collapse = begun(scene, &under.scene.origin)?;
     let unit = collapse.units().time();
     let end = scene.duration_scaled * unit;
     let threshold = scene.front_height_scaled * scene.height;
     let mut course = Course::default();
+    if scene.terrain.is_some() {
+        course.ground = collapse.ground_heights();
+    }
     if let Some(checkpoint) = &under.resumed {
         let damaged =
             || Failure::Input("--resume: the checkpoint misses a part; nothing was changed".into());
         let (before, state) = Course::restored(&checkpoint.record).ok_or_else(damaged)?;
+        if before.ground != course.ground {
+            return Err(Failure::Input(
+                "--resume: the file of the terrain has other heights than when the run was begun; nothing was changed".into(),
+            ));
+        }
         course = before;
         collapse
             .set_state(state)
@@ -370,16 +396,26 @@ fn tables(collapse: &Collapse, course: &Course) -> Vec<Table> {
     let (x, h) = collapse.profile();
     let fronts = &course.fronts;
     let [times, positions, heights] = &course.profiles;
+    // On ground, its height beside the depth of the material on it.
+    let on_ground = |table: Table| {
+        if course.ground.is_empty() {
+            return table;
+        }
+        let instants = table.rows() / course.ground.len();
+        table.with("z_ground", "m", course.ground.repeat(instants))
+    };
     vec![
         Table::new("front")
             .with("t", "s", fronts.iter().map(|f| f.time).collect())
             .with("x_front", "m", fronts.iter().map(|f| f.position).collect())
             .with("height", "m", fronts.iter().map(|f| f.height).collect()),
-        Table::new("deposit").with("x", "m", x).with("h", "m", h),
-        Table::new("profiles")
-            .with("t", "s", times.clone())
-            .with("x", "m", positions.clone())
-            .with("h", "m", heights.clone()),
+        on_ground(Table::new("deposit").with("x", "m", x).with("h", "m", h)),
+        on_ground(
+            Table::new("profiles")
+                .with("t", "s", times.clone())
+                .with("x", "m", positions.clone())
+                .with("h", "m", heights.clone()),
+        ),
         Table::new("flowing")
             .with("t", "s", course.flowing[0].clone())
             .with("flowing_share", "1", course.flowing[1].clone())

@@ -1,7 +1,7 @@
 //! Keys of the collapse of a column.
 
 use super::world::{OutputKeys, StepKeys};
-use super::{ColumnGrainKeys, FrictionLaw, LawKeys, RheologyKeys, SceneError};
+use super::{ColumnGrainKeys, FrictionLaw, LawKeys, RheologyKeys, SceneError, TerrainKeys};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -38,6 +38,9 @@ pub struct CollapseScene {
     /// Side walls of a narrow channel; a plane of any width without them.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub side_walls: Option<CollapseWalls>,
+    /// Ground instead of a level floor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub terrain: Option<TerrainKeys>,
     /// The grid.
     pub grid: CollapseGrid,
     /// The solver.
@@ -161,6 +164,16 @@ impl CollapseScene {
                     self.scale
                 ),
             );
+        }
+        if let Some(terrain) = &self.terrain {
+            terrain.check_together(origin)?;
+            if self.overhang_degrees != 0.0 {
+                return refused(
+                    "overhang_degrees",
+                    self.overhang_degrees.to_string(),
+                    "0 with [terrain]: the column's face stands upright there".into(),
+                );
+            }
         }
         let r = &self.rheology;
         if let Some([low, high]) = r.valid_i.as_deref()

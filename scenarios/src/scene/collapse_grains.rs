@@ -168,6 +168,10 @@ impl CollapseScene {
             let range = "none with model = \"dem\": the slab of grains is periodic across";
             return Err(at("").refuse("side_walls", "a table", range));
         }
+        if self.terrain.is_some() {
+            let range = "none with model = \"dem\": grains collapse on a level floor";
+            return Err(at("").refuse("terrain", "a table", range));
+        }
         let (d, least) = (self.grains.diameter, self.height.min(self.width()));
         if d * FEWEST_GRAINS > least {
             let range = format!(

@@ -72,6 +72,7 @@ fn step(
             &[1, 0]
         },
         incompressible: &incompressible,
+        ground: None,
     };
     transport.advance(&motion, fractions, velocity);
 }

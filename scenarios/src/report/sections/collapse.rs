@@ -2,18 +2,20 @@
 
 use super::{HEIGHT, WIDTH, figure};
 use crate::report::page::number;
-use crate::report::plot::{Mark, Plot};
+use crate::report::plot::{Band, Mark, Plot};
 use crate::table::Table;
 use maud::{Markup, html};
 
 /// Profiles drawn, beside the deposit.
 const CURVES: usize = 6;
 
-/// The profiles (t, x, h) as they follow each other in the table.
+/// The profiles (t, x, h) as they follow each other in the table, h on top of the ground if there is any.
 fn instants(table: &Table) -> Vec<(f64, Vec<(f64, f64)>)> {
     let mut instants: Vec<(f64, Vec<(f64, f64)>)> = Vec::new();
+    let ground = table.column("z_ground").iter().copied();
     let rows = table.column("t").iter().zip(table.pairs("x", "h"));
-    for (&time, point) in rows {
+    for ((&time, (x, h)), ground) in rows.zip(ground.chain(std::iter::repeat(0.0))) {
+        let point = (x, h + ground);
         match instants.last_mut() {
             Some((last, points)) if *last == time => points.push(point),
             _ => instants.push((time, vec![point])),
@@ -22,15 +24,39 @@ fn instants(table: &Table) -> Vec<(f64, Vec<(f64, f64)>)> {
     instants
 }
 
+/// A column against x at the first instant.
+fn at_start(table: &Table, column: &str) -> Vec<(f64, f64)> {
+    let first = table.column("t").first().copied();
+    let times = table.column("t").iter();
+    let points = times.zip(table.pairs("x", column));
+    points
+        .take_while(|(time, _)| Some(**time) == first)
+        .map(|(_, point)| point)
+        .collect()
+}
+
 /// Pictures of a collapse.
 pub(super) fn collapse(profiles: &Table, front: Option<&Table>) -> Markup {
     let instants = instants(profiles);
     let every = instants.len().div_ceil(CURVES).max(1);
-    let mut shapes = Plot::new("x [m]", "height of the heap h [m]");
-    shapes.from_zero = true;
+    let ground: Vec<(f64, f64)> = at_start(profiles, "z_ground");
+    let mut shapes = if ground.is_empty() {
+        Plot::new("x [m]", "height of the heap h [m]")
+    } else {
+        Plot::new("x [m]", "height z [m]")
+    };
+    shapes.from_zero = ground.is_empty();
     for (n, (time, points)) in instants.iter().step_by(every).enumerate() {
         let mark = if n == 0 { Mark::Dashes } else { Mark::Line };
         shapes = shapes.with(&format!("{} s", number(*time)), mark, n, points.clone());
+    }
+    let lowest = ground.iter().map(|p| p.1).fold(f64::INFINITY, f64::min);
+    if !ground.is_empty() {
+        shapes.bands.push(Band {
+            colour: 6,
+            points: ground.iter().map(|&(x, z)| (x, lowest, z)).collect(),
+        });
+        shapes = shapes.with("ground", Mark::Line, 6, ground);
     }
     html! {
         h2 { "Collapse" }

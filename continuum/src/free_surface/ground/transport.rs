@@ -1,0 +1,118 @@
+//! Moving volume over ground.
+//!
+//! Matter and ground together are reconstructed as if they were one; what moves through the free part of
+//! a face is the share of matter in the free part of what lies behind it. A full cell therefore passes
+//! on exactly its face's flux. Cells with a small free part may receive more than they hold, or give more
+//! than they have: the rest moves on to cells beside and above them, so that volume is kept and no cell
+//! that ground cuts stays overfull.
+
+use super::Ground;
+use crate::free_surface::fraction::volume_in;
+use crate::free_surface::plane::Plane;
+use crate::free_surface::topology::{NONE, Topology};
+use crate::grid::DIMENSIONS;
+
+/// More than a cell holds, or less than nothing, by this much is round-off.
+const ROUND_OFF: f64 = 1e-13;
+/// Times that excess is looked for.
+const ROUNDS: usize = 4;
+
+impl Ground {
+    /// Share of matter in the free part of a slab behind a face (corners in cell coordinates).
+    pub(crate) fn matter(
+        &self,
+        cell: usize,
+        fraction: f64,
+        plane: Option<&Plane>,
+        low: [f64; 3],
+        high: [f64; 3],
+    ) -> f64 {
+        if fraction <= 0.0 {
+            return 0.0;
+        }
+        let Some(plane) = plane else { return 1.0 };
+        let slab: f64 = (0..3).map(|axis| high[axis] - low[axis]).product();
+        let solid = match &self.planes[cell] {
+            Some(ground) => ground.volume_in(low, high),
+            None => self.solid[cell] * slab,
+        };
+        let free = slab - solid;
+        if free <= ROUND_OFF * slab {
+            return (fraction / self.free[cell]).min(1.0);
+        }
+        ((volume_in(1.0, Some(plane), low, high) - solid) / free).clamp(0.0, 1.0)
+    }
+
+    /// Moves what does not fit into cells beside the ground to where there is room.
+    pub(crate) fn settle(&self, topology: &Topology, fractions: &mut [f64]) {
+        for _ in 0..ROUNDS {
+            let mut moved = false;
+            for &cell in &self.cut {
+                moved |= self.fill_up(topology, fractions, cell);
+                let mut at = cell;
+                // What has no room beside it lifts the column above.
+                while self.push_out(topology, fractions, at) {
+                    moved = true;
+                    let above = topology.cell_neighbours[at][DIMENSIONS - 1][1];
+                    if above == NONE || fractions[above] <= self.free[above] + ROUND_OFF {
+                        break;
+                    }
+                    at = above;
+                }
+            }
+            if !moved {
+                return;
+            }
+        }
+    }
+
+    /// Open neighbours of a cell, the one above last.
+    fn beside(&self, topology: &Topology, cell: usize) -> [usize; 2 * DIMENSIONS] {
+        let mut order = [NONE; 2 * DIMENSIONS];
+        for (n, slot) in order.iter_mut().enumerate() {
+            let (axis, side) = (n / 2, n % 2);
+            let face = topology.cell_faces[cell][axis][side];
+            if face != NONE && self.aperture[axis][face] > 0.0 {
+                *slot = topology.cell_neighbours[cell][axis][side];
+            }
+        }
+        order
+    }
+
+    /// Gives what a cell holds too much to its neighbours, as much as they have room for, and the rest
+    /// to the one above. Says whether there was any.
+    fn push_out(&self, topology: &Topology, fractions: &mut [f64], cell: usize) -> bool {
+        let mut excess = fractions[cell] - self.free[cell];
+        if excess <= ROUND_OFF {
+            return false;
+        }
+        let beside = self.beside(topology, cell);
+        for next in beside.into_iter().filter(|&next| next != NONE) {
+            let part = (self.free[next] - fractions[next]).max(0.0).min(excess);
+            fractions[next] += part;
+            fractions[cell] -= part;
+            excess -= part;
+        }
+        let above = beside[2 * DIMENSIONS - 1];
+        if excess > ROUND_OFF && above != NONE {
+            fractions[above] += excess;
+            fractions[cell] -= excess;
+        }
+        true
+    }
+
+    /// Takes what a cell has less than nothing from its neighbours. Says whether there was any.
+    fn fill_up(&self, topology: &Topology, fractions: &mut [f64], cell: usize) -> bool {
+        if fractions[cell] >= -ROUND_OFF {
+            return false;
+        }
+        for next in self.beside(topology, cell) {
+            if next != NONE {
+                let part = fractions[next].max(0.0).min(-fractions[cell]);
+                fractions[next] -= part;
+                fractions[cell] += part;
+            }
+        }
+        true
+    }
+}

@@ -1,0 +1,69 @@
+//! The ground under a collapse, from the scene's points or its file.
+
+use crate::failure::Failure;
+use crate::scene::{CollapseScene, ContactKind, TerrainKeys};
+use crate::{height_files, mesh_files};
+use colluvium_continuum::column_collapse::CollapseGround;
+use colluvium_continuum::free_surface::Contact;
+use colluvium_continuum::terrain::{Profile, Surface};
+use colluvium_continuum::wall_friction::WallFriction;
+use std::path::Path;
+
+/// The ground that a scene describes, if it has any; `origin` names the scene in messages.
+pub fn ground(scene: &CollapseScene, origin: &str) -> Result<Option<CollapseGround>, Failure> {
+    let Some(keys) = &scene.terrain else {
+        return Ok(None);
+    };
+    let refused = |error: String| Failure::Input(format!("{origin}: {error}"));
+    let profile = profile(keys).map_err(refused)?;
+    Ok(Some(CollapseGround {
+        profile,
+        contact: match keys.contact {
+            ContactKind::NoSlip => Contact::NoSlip,
+            ContactKind::FreeSlip => Contact::FreeSlip,
+            ContactKind::Coulomb => Contact::Coulomb(WallFriction {
+                friction: keys.friction.unwrap_or(0.0),
+                cohesion: 0.0,
+            }),
+        },
+    }))
+}
+
+fn profile(keys: &TerrainKeys) -> Result<Profile, String> {
+    let said = |error: colluvium_continuum::Error| error.to_string();
+    if let Some(points) = &keys.profile {
+        return Profile::new(points.clone()).map_err(said);
+    }
+    let [x, y] = keys.start.unwrap_or_default();
+    let Some((key, file)) = keys.file() else {
+        return Err("key `terrain.profile` is missing".into());
+    };
+    let path = Path::new(file);
+    let in_file = |error: String| format!("key `terrain.{key}`: {error}");
+    let line = if key == "heights" {
+        let raster = height_files::read(path).map_err(|error| in_file(error.to_string()))?;
+        let last = raster.origin[1] + raster.spacing[1] * (raster.points[1] - 1) as f64;
+        if !(raster.origin[1]..=last).contains(&y) {
+            return Err(format!(
+                "key `terrain.start` has y = {y} m; {file} has heights from {} to {last} m",
+                raster.origin[1]
+            ));
+        }
+        raster.profile(y)
+    } else {
+        let surface = mesh_files::read_surface(path).map_err(|error| in_file(error.to_string()))?;
+        let unit = keys.unit.unwrap_or(1.0);
+        let vertices = surface
+            .vertices
+            .iter()
+            .map(|v| [v.x * unit, v.y * unit, v.z * unit]);
+        let triangles = surface
+            .triangles
+            .iter()
+            .map(|t| t.map(|corner| corner as usize));
+        Surface::new(vertices.collect(), triangles.collect()).and_then(|surface| surface.profile(y))
+    }
+    .map_err(|error| in_file(format!("{file}: {error}")))?;
+    let points = line.points().iter().map(|[px, z]| [px - x, *z]);
+    Profile::new(points.collect()).map_err(said)
+}

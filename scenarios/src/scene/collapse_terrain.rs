@@ -1,0 +1,119 @@
+//! Keys of the ground under a collapse: `[terrain]`.
+
+use super::SceneError;
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Ground instead of a level floor, as points or as a section along x of a raster or a mesh.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct TerrainKeys {
+    /// Points (x, z) (m) of its surface, ground on the right hand of the line; two points of the same x
+    /// make a cliff.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub profile: Option<Vec<[f64; 2]>>,
+    /// File of heights (ESRI ASCII or GeoTIFF).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub heights: Option<String>,
+    /// File of a triangle surface (STL, OBJ, PLY, VTK, VTU, VTP, Gmsh).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub mesh: Option<String>,
+    /// Metres in a unit of the mesh; left out: 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
+    pub unit: Option<f64>,
+    /// Position (x, y) (m) in the file of the plane of symmetry x = 0; the section runs along x from
+    /// there. Left out: the file's zero.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub start: Option<[f64; 2]>,
+    /// What holds on its surface.
+    #[serde(default)]
+    pub contact: ContactKind,
+    /// Friction coefficient of the material on it, under contact = "coulomb".
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minimum" = 0.0, "maximum" = 10.0))]
+    pub friction: Option<f64>,
+}
+
+/// What holds on the surface of ground.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ContactKind {
+    /// Material at the ground stands still.
+    #[default]
+    NoSlip,
+    /// It slides once the ground bears all the shear stress it can.
+    Coulomb,
+    /// It slides freely.
+    FreeSlip,
+}
+
+impl TerrainKeys {
+    /// The file that the ground is read from, and its key.
+    pub fn file(&self) -> Option<(&'static str, &str)> {
+        let heights = self.heights.as_deref().map(|f| ("heights", f));
+        heights.or(self.mesh.as_deref().map(|f| ("mesh", f)))
+    }
+
+    pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {
+        let refused = |key: &str, value: String, range: &str| {
+            Err(SceneError::OutOfRange {
+                file: origin.to_owned(),
+                key: format!("terrain.{key}"),
+                value,
+                range: range.to_owned(),
+            })
+        };
+        let given = [
+            ("profile", self.profile.is_some()),
+            ("heights", self.heights.is_some()),
+            ("mesh", self.mesh.is_some()),
+        ];
+        let names: Vec<&str> = given.iter().filter(|g| g.1).map(|g| g.0).collect();
+        if names.is_empty() {
+            return Err(SceneError::MissingKey {
+                file: origin.to_owned(),
+                key: "terrain.profile".into(),
+                wanted: "points [[x, z], ...] in m, or terrain.heights or terrain.mesh, a file"
+                    .into(),
+            });
+        }
+        if names.len() > 1 {
+            return refused(
+                names[1],
+                "given".into(),
+                &format!(
+                    "only one of profile, heights and mesh; terrain.{} is there",
+                    names[0]
+                ),
+            );
+        }
+        if let (Some(unit), None) = (self.unit, &self.mesh) {
+            return refused(
+                "unit",
+                unit.to_string(),
+                "left out, unless there is a terrain.mesh",
+            );
+        }
+        if let (Some(start), Some(_)) = (self.start, &self.profile) {
+            return refused(
+                "start",
+                format!("{start:?}"),
+                "left out, unless the ground comes from a file",
+            );
+        }
+        match (self.contact, self.friction) {
+            (ContactKind::Coulomb, None) => Err(SceneError::MissingKey {
+                file: origin.to_owned(),
+                key: "terrain.friction".into(),
+                wanted: "the friction coefficient of contact = \"coulomb\"".into(),
+            }),
+            (ContactKind::NoSlip | ContactKind::FreeSlip, Some(friction)) => refused(
+                "friction",
+                friction.to_string(),
+                "left out, unless terrain.contact is \"coulomb\"",
+            ),
+            _ => Ok(()),
+        }
+    }
+}
