@@ -63,15 +63,8 @@ impl InclineRun {
     pub fn new(spec: InclineSpec) -> Result<Self, InclineError> {
         spec.validate()?;
         let mut simulation = Simulation::new(spec.setup())?;
-        if let Start::Flow { inertial_number } = spec.start {
-            let height = spec.bed_height() * spec.starting_stretch();
-            // u(z) = (2/3)(I/d) √(φ g cos θ) [H^{3/2} − (H − z)^{3/2}] with a loose φ: Bagnold's profile.
-            let scale = 2.0 / 3.0 * inertial_number / spec.diameter
-                * (spec::FLOWING_SOLID_FRACTION * spec.gravity * spec.slope.cos()).sqrt();
-            simulation.give_velocity(|grain| {
-                let z = grain.position.z.clamp(0.0, height);
-                Vector3::x() * scale * (height.powf(1.5) - (height - z).powf(1.5))
-            });
+        if let Some(flow) = spec.starting_flow(spec.bed_height() * spec.starting_stretch()) {
+            simulation.give_velocity(|grain| Vector3::x() * flow(grain.position.z));
         }
         Self::around(spec, simulation)
     }

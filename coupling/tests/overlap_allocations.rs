@@ -75,6 +75,7 @@ fn steps_between_exchanges_allocate_nothing() {
     let spec = OverlapSpec {
         edge: FlatEdge::across(&domain, 2, 0, true, 12.0),
         rheology,
+        mass: None,
         far_end: Boundary::FreeSurface,
         scales: Scales {
             diameter: 1.0,
@@ -84,6 +85,7 @@ fn steps_between_exchanges_allocate_nothing() {
         },
         settings: OverlapSettings {
             normal_motion: Some(NormalMotion::Riding),
+            exchange_time: Some(0.04),
             ..Default::default()
         },
         strain_rate_floor: 1e-6,

@@ -6,7 +6,8 @@
 //! ```text
 //! d(m v)/dt = Σ F_contact + m g + F_load        d(I ω)/dt = Σ M_contact + M_load
 //! ```
-//! Rows exist only where a scene has loads, so that others pay one comparison a grain.
+//! Rows exist only where a scene has loads, so that others pay one comparison a grain; where only some grains have
+//! any, only those have rows.
 
 use crate::bonds::{Bond, Bonds};
 use crate::grains::{Grains, vector};
@@ -28,11 +29,16 @@ pub struct Load {
     pub moment: Vector3<f64>,
 }
 
+/// Mark of a grain without a row.
+const NO_ROW: u32 = u32::MAX;
+
 /// Loads of all grains in the present step.
 #[derive(Clone, Debug, Default)]
 pub(crate) struct Loads {
-    /// Force (N) and moment (N m) on each grain; empty where a scene has no loads.
+    /// Force (N) and moment (N m) on grains; empty where a scene has no loads.
     rows: Vec<[[f64; 4]; 2]>,
+    /// Row of each grain, or [`NO_ROW`]; empty where each grain has its own.
+    index: Vec<u32>,
     /// Steady loads by grain number.
     given: Vec<Load>,
     /// Rows of the grains in `given`.
@@ -45,7 +51,11 @@ impl Loads {
     /// Force and moment on a grain.
     #[inline(always)]
     pub fn of(&self, grain: usize) -> Option<&[[f64; 4]; 2]> {
-        self.rows.get(grain)
+        match self.index.get(grain) {
+            None => self.rows.get(grain),
+            Some(&NO_ROW) => None,
+            Some(&row) => self.rows.get(row as usize),
+        }
     }
 
     /// Whether there are none.
@@ -64,8 +74,28 @@ impl Loads {
     /// Makes room for the loads of a step, of so many grains.
     fn clear(&mut self, grains: usize) {
         self.external = Vector3::zeros();
+        self.index.clear();
         self.rows.clear();
         self.rows.resize(grains, [[0.0; 4]; 2]);
+    }
+
+    /// Lays the steady loads alone, on the grains that have any.
+    fn lay_given(&mut self, grains: &Grains) {
+        self.clear(0);
+        self.index.resize(grains.len(), NO_ROW);
+        for (&at, load) in self.places.iter().zip(&self.given) {
+            let at = at as usize;
+            if grains.is_fixed(at) {
+                continue;
+            }
+            let row = &mut self.index[at];
+            if *row == NO_ROW {
+                *row = self.rows.len() as u32;
+                self.rows.push([[0.0; 4]; 2]);
+            }
+            add(&mut self.rows[*row as usize], &load.force, &load.moment);
+            self.external += load.force;
+        }
     }
 
     /// Adds the steady loads.
@@ -164,6 +194,10 @@ impl Simulation {
             self.loads.clear(0);
             return;
         }
+        if self.bonds.is_empty() && !self.fields.has_fields() {
+            self.loads.lay_given(grains);
+            return;
+        }
         self.loads.clear(grains.len());
         self.loads.add_given(grains);
         if self.fields.has_fields() {
@@ -220,6 +254,7 @@ impl Simulation {
             // Where loads change every step their number does too.
             self.loads.given.reserve(2 * loads.len());
             self.loads.places.reserve(2 * loads.len());
+            self.loads.rows.reserve(2 * loads.len());
         }
         self.loads.given.extend_from_slice(loads);
         self.loads.settle(&self.places);

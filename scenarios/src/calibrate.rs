@@ -17,7 +17,7 @@ use crate::report::calibration::Campaign;
 use crate::rheology_file::{FitRow, Provenance, RheologyFile};
 use crate::run::{self, Ended, RunOptions, incline, precheck};
 use crate::run_directory::RunDirectory;
-use crate::scene::{InclineScene, Scene, SceneBody};
+use crate::scene::{InclineModel, InclineScene, Scene, SceneBody};
 use crate::summary::Status;
 use colluvium_coupling::calibration::{MuIFit, friction_table};
 use colluvium_coupling::campaign::{
@@ -50,6 +50,10 @@ pub fn calibrate(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> 
             scene.name
         )));
     };
+    if body.model != InclineModel::Dem {
+        let range = "dem: a campaign measures grains; set model=dem";
+        return Err(scene.out_of_range("model", body.model.word(), range).into());
+    }
     interruption::listen();
     precheck::incline(scene, body)?;
     let spec = campaign_spec(scene, body, &precheck::stand_in_bed(body), Beds::default());
@@ -149,7 +153,7 @@ fn more_beds(body: &InclineScene) -> Result<Option<Beds>, Failure> {
     let settled: Vec<Result<Option<Bed>, Failure>> = scenes
         .par_iter()
         .with_max_len(1)
-        .map(|scene| incline::settle(scene, Threads::Serial, &Bar::hidden()))
+        .map(|scene| incline::settle(&incline::bed(scene), Threads::Serial, &Bar::hidden()))
         .collect();
     let mut beds = Beds::default();
     for (k, bed) in settled.into_iter().enumerate() {
@@ -291,7 +295,7 @@ fn campaign(
     } else {
         Threads::Serial
     };
-    let bed = incline::settle(body, sharing, &bar)?.ok_or_else(stopped)?;
+    let bed = incline::settle(&incline::bed(body), sharing, &bar)?.ok_or_else(stopped)?;
     bar.clear();
     directory.journal.note(&format!(
         "bed: {} grains over {} fixed, depth {:.4} m, solid fraction {:.4}",

@@ -3,6 +3,7 @@
 mod observables;
 
 use crate::calibrate;
+use crate::cost::Cost;
 use crate::failure::{Failure, Resumes};
 use crate::report;
 use crate::run::{self, RunOptions};
@@ -126,7 +127,7 @@ impl Comparison {
 
     /// Makes the runs, writes table, summary and report.
     fn finish(&self, directory: &RunDirectory, threads: Option<usize>) -> Result<String, Failure> {
-        let rows = self.run_all(directory, threads)?;
+        let (rows, reference) = self.run_all(directory, threads)?;
         let table = self.table(&rows);
         directory.write_table(&table)?;
         let mut summary = Summary::begun(&self.scene.name, "pareto");
@@ -156,9 +157,23 @@ impl Comparison {
                 Quantity::new(order, "1").from("between the last two runs"),
             );
         }
+        let mut end_point = String::new();
+        if let Some(cost) = &reference {
+            let steps = cost.grain_steps + cost.cell_steps;
+            end_point = format!("\nreference: {:.4} s, {steps} steps", cost.wall_s);
+            let source = "of the run that counts as right, the end point of error against cost";
+            summary.put(
+                "reference_wall_s",
+                Quantity::new(cost.wall_s, "s").from(source),
+            );
+            summary.put(
+                "reference_steps",
+                Quantity::new(steps as f64, "1").from(source),
+            );
+        }
         directory.write_summary(&summary)?;
         report::write(directory.path())?;
-        let mut text = self.text(&rows);
+        let mut text = self.text(&rows) + &end_point;
         text.push_str(&format!(
             "\n{}",
             directory.file(run_directory::REPORT).display()
@@ -170,7 +185,7 @@ impl Comparison {
         &self,
         directory: &RunDirectory,
         threads: Option<usize>,
-    ) -> Result<Vec<Row>, Failure> {
+    ) -> Result<(Vec<Row>, Option<Cost>), Failure> {
         let one = |label: &str, scene: &Scene| -> Result<PathBuf, Failure> {
             directory.journal.note(&format!("run {label}"));
             let out = Some(directory.path().join(label));
@@ -236,7 +251,7 @@ impl Comparison {
                 steps: summary.cost.grain_steps + summary.cost.cell_steps,
             });
         }
-        Ok(rows)
+        Ok((rows, reference_cost))
     }
 
     /// Keys of a campaign are compared by campaigns.

@@ -2,6 +2,7 @@
 
 mod bed;
 mod collapse;
+mod joined_incline;
 mod law;
 mod world;
 
@@ -24,7 +25,10 @@ use std::time::Instant;
 /// The plan as text.
 pub fn plan(scene: &Scene) -> Result<String, Failure> {
     match &scene.body {
-        SceneBody::Incline(body) => incline(scene, body),
+        SceneBody::Incline(body) => match body.continuum_keys() {
+            None => incline(scene, body),
+            Some(keys) => joined_incline::plan(scene, body, keys),
+        },
         SceneBody::Bagnold(body) => bagnold(body),
         SceneBody::Collapse(body) if body.model == CollapseModel::Dem => {
             world::plan(scene, body.as_ref())

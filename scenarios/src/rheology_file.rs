@@ -1,6 +1,6 @@
 //! `rheology.toml`: a μ(I) law with its errors, its validity and its provenance.
 
-use crate::scene::{SceneError, check_continuum_keys};
+use crate::scene::{SceneError, check_continuum_keys, layers};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
@@ -19,6 +19,16 @@ pub const ALTERNATIVES: &[&[&str]] = &[
     &["rheology.file", "rheology.good"],
     &["rheology.file", "rheology.source"],
 ];
+
+/// Which stress friction is measured against.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum FrictionOf {
+    /// |τ|/p, p = trace/3.
+    Pressure,
+    /// |τ|/σ_zz.
+    NormalStress,
+}
 
 /// A fitted rheology as it stands in a file; SI units.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -226,16 +236,37 @@ impl RheologyFile {
 /// Puts the numbers of the file in the place of `rheology.file`; gives the file's path.
 ///
 /// The resolved scene then stands alone: it can be run again when the file has gone.
-pub fn resolve(table: &mut Table) -> Result<Option<PathBuf>, SceneError> {
+pub fn resolve(table: &mut Table, friction: FrictionOf) -> Result<Option<PathBuf>, SceneError> {
     let Some(Value::Table(rheology)) = table.get_mut("rheology") else {
         return Ok(None);
     };
     let Some(Value::String(path)) = rheology.remove("file") else {
         return Ok(None);
     };
-    let law = RheologyFile::read(Path::new(&path))?;
-    rheology.extend(law.scene_keys(&path));
+    let mut law = RheologyFile::read(Path::new(&path))?;
+    let source = match (friction, law.mu_zz.take()) {
+        (FrictionOf::NormalStress, Some(fit)) => {
+            (law.mu_s, law.mu_2, law.i_0) = (fit.mu_s, fit.mu_2, fit.i_0);
+            law.check().map_err(|message| SceneError::Rheology {
+                path: path.clone(),
+                message: format!("[mu_zz]: {message}"),
+            })?;
+            format!("{path}, friction against sigma_zz")
+        }
+        _ => path.clone(),
+    };
+    rheology.extend(law.scene_keys(&source));
     Ok(Some(PathBuf::from(path)))
+}
+
+/// Makes the path of a rheology file in a scene file relative to that file's folder, unless it is the name of a bundled
+/// law.
+pub fn anchor(table: &mut Table, folder: &Path) {
+    let named = layers::get(table, "rheology.file").and_then(Value::as_str);
+    let bundled = named.is_some_and(|path| BUNDLED.iter().any(|(name, _)| *name == path));
+    if !bundled || named.is_some_and(|path| folder.join(path).exists()) {
+        layers::anchor_path(table, "rheology.file", folder);
+    }
 }
 
 /// Removes from a layer what it says about its law where the layer above gives other numbers: the

@@ -12,6 +12,7 @@ pub mod collapse_ground;
 mod column_of_grains;
 mod comet;
 mod comet_block;
+pub mod continuum_incline;
 pub mod energy_table;
 pub mod grain_table;
 mod grains;
@@ -19,6 +20,7 @@ mod heap;
 pub mod impact;
 pub mod impact_scales;
 pub mod incline;
+pub mod joined_incline;
 mod march_record;
 pub mod precheck;
 pub mod settle;
@@ -34,7 +36,7 @@ use crate::frames;
 use crate::report;
 use crate::results_file;
 use crate::run_directory::{self, RunDirectory};
-use crate::scene::{Scene, SceneBody};
+use crate::scene::{InclineModel, Scene, SceneBody};
 use crate::summary::{Status, Summary};
 use crate::table::Table;
 use colluvium_dem::{Record, Threads};
@@ -279,7 +281,11 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> {
     };
     let found = pool(threads).and_then(|pool| {
         pool.install(|| match &scene.body {
-            SceneBody::Incline(body) => incline::run(body, &mut under),
+            SceneBody::Incline(body) => match body.model {
+                InclineModel::Dem => incline::run(body, &mut under),
+                InclineModel::Continuum => continuum_incline::run(body, &mut under),
+                InclineModel::Hybrid => joined_incline::run(body, &mut under),
+            },
             SceneBody::Bagnold(body) => bagnold::run(body, &mut under),
             SceneBody::Impact(body) => impact::run(body, &mut under),
             SceneBody::Chute(body) => chute::run(body, &mut under),

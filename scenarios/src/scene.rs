@@ -26,6 +26,7 @@ mod law;
 mod law_layers;
 mod layer_case;
 pub mod layers;
+mod overlap;
 mod settle;
 mod silo;
 mod tensile;
@@ -57,17 +58,19 @@ pub use law::{
     CohesionKind, LawKeys, LeverKind, MemoryKind, NormalKind, Parts, RollingKind, TangentialKind,
 };
 pub use layer_case::{LayerCase, LayerVisitor};
+pub use overlap::{InclineModel, NormalMotionKind, OverlapKeys};
 pub use settle::{SettleFloor, SettleGrains, SettleScene};
 pub use silo::SiloScene;
 pub use tensile::{ClampKind, TensileScene};
 pub use tumbling_box::{Attitude, BedKeys, LanderKeys, TumblingBoxScene};
 
-use crate::rheology_file;
+use crate::rheology_file::{self, FrictionOf};
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// The names and texts of the bundled scenes.
-pub const BUNDLED: [(&str, &str); 19] = [
+pub const BUNDLED: [(&str, &str); 20] = [
+    ("incline", include_str!("../scenes/incline.toml")),
     (
         "incline-moderate",
         include_str!("../scenes/incline-moderate.toml"),
@@ -230,6 +233,7 @@ impl Scene {
         let drops: &[&[&str]] = match kind {
             Family::Bagnold => &[],
             Family::Collapse => &law::CHOICES,
+            Family::Incline => &INCLINE_CHOICES[..1],
             _ => choices,
         };
         let impact = matches!(kind, Family::Impact);
@@ -240,7 +244,7 @@ impl Scene {
         check::check(&own, &schema, origin)?;
         layers::check_choices(&own, choices, origin)?;
         if let Some(folder) = folder {
-            layers::anchor_path(&mut own, "rheology.file", folder);
+            rheology_file::anchor(&mut own, folder);
             if matches!(kind, Family::Chute | Family::Settle) {
                 layers::anchor_path(&mut own, "start", folder);
             }
@@ -255,14 +259,20 @@ impl Scene {
         }
         // What was written, before a file's numbers take their places.
         let mut written = own.clone();
+        // A flow down a slope goes by |τ|/σ_zz, which its weight gives.
+        let friction = match kind {
+            Family::Incline => FrictionOf::NormalStress,
+            _ => FrictionOf::Pressure,
+        };
+        rheology_file::resolve(&mut base, friction)?;
         friction_keys::forget_defaults(&mut written, &base);
         let mut inputs = Vec::new();
-        inputs.extend(rheology_file::resolve(&mut own)?);
+        inputs.extend(rheology_file::resolve(&mut own, friction)?);
         let mut set = layers::parse_settings(settings, option)?;
         let set_by_hand = set.clone();
         check::check(&set, &schema, option)?;
         layers::check_choices(&set, choices, option)?;
-        inputs.extend(rheology_file::resolve(&mut set)?);
+        inputs.extend(rheology_file::resolve(&mut set, friction)?);
         rheology_file::drop_stale_notes(&mut base, &own);
         if impact {
             law_layers::lift(&mut own, origin)?;
@@ -284,7 +294,8 @@ impl Scene {
             law_layers::check_read(&table, &set, (impact, true), option)?;
             law_layers::drop_unread(&mut table, impact);
         }
-        if matches!(kind, Family::Bagnold | Family::Collapse) {
+        let of_incline = matches!(kind, Family::Incline) && table.contains_key("rheology");
+        if of_incline || matches!(kind, Family::Bagnold | Family::Collapse) {
             // A bundled scene has the numbers of all laws, as defaults.
             if folder.is_some() && !friction_keys::chooses(&set) {
                 friction_keys::check_read(&table, &written, origin)?;
@@ -454,17 +465,28 @@ fn family(name: &str) -> Family {
 /// Keys of which exactly one may be given: naming one drops the others' defaults.
 fn alternatives(name: &str) -> &'static [&'static [&'static str]] {
     match family(name) {
-        Family::Incline => &[&[
-            "contact.stiffness_scaled",
-            "contact.stiffness",
-            "contact.stiffness_from_speed",
-        ]],
+        Family::Incline => &INCLINE_CHOICES,
         Family::Bagnold => rheology_file::ALTERNATIVES,
         Family::Collapse => &COLLAPSE_CHOICES,
         Family::Impact | Family::Grains => &law::CHOICES,
         Family::Chute | Family::Settle => &BED_CHOICES,
     }
 }
+
+/// Alternatives of inclines: the stiffness, and a rheology file or numbers.
+const INCLINE_CHOICES: [&[&str]; 12] = {
+    let mut choices: [&[&str]; 12] = [&[
+        "contact.stiffness_scaled",
+        "contact.stiffness",
+        "contact.stiffness_from_speed",
+    ]; 12];
+    let mut k = 0;
+    while k < rheology_file::ALTERNATIVES.len() {
+        choices[k + 1] = rheology_file::ALTERNATIVES[k];
+        k += 1;
+    }
+    choices
+};
 
 /// Alternatives of the scenes of a bed: its length, and those of the law.
 const BED_CHOICES: [&[&str]; 4] = [

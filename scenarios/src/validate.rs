@@ -4,6 +4,7 @@
 //! is not run again) and says what it compares with what. Adding a suite = one file and one line in [`SUITES`].
 
 mod incline;
+mod overlap;
 
 use crate::failure::Failure;
 use crate::report::page::{number, page, with_error};
@@ -91,11 +92,18 @@ pub struct Suite {
 }
 
 /// All suites.
-pub const SUITES: &[Suite] = &[Suite {
-    name: "incline",
-    about: "grains and continuum on rough inclined planes against theory, published values and another code",
-    run: incline::run,
-}];
+pub const SUITES: &[Suite] = &[
+    Suite {
+        name: "incline",
+        about: "grains and continuum on rough inclined planes against theory, published values and another code",
+        run: incline::run,
+    },
+    Suite {
+        name: "overlap",
+        about: "a slope as grains, as continuum and as both joined, with a joint that exchanges nothing as the control",
+        run: overlap::run,
+    },
+];
 
 /// Runs one suite, or all of them; gives the report's path and how many judged figures do not agree.
 ///

@@ -10,6 +10,59 @@ use std::fs;
 /// Arguments, and what the message has to contain.
 const CASES: &[(&[&str], &[&str])] = &[
     (
+        &["run", "incline", "--set", "model=grains"],
+        &["model", "grains", "dem, continuum, hybrid"],
+    ),
+    (
+        &["run", "incline-moderate", "--set", "model=hybrid"],
+        &["rheology", "missing", "hybrid"],
+    ),
+    (
+        &["run", "incline", "--set", "overlap.hight_diameters=9"],
+        &["overlap.hight_diameters", "`overlap.height_diameters`"],
+    ),
+    (
+        &["run", "incline", "--set", "overlap.height_diameters=5"],
+        &["overlap.height_diameters", "5", "at least a cell"],
+    ),
+    (
+        &["run", "incline", "--set", "overlap.height_diameters=90"],
+        &["overlap.height_diameters", "90", "[7.0000, "],
+    ),
+    (
+        &["run", "incline", "--set", "overlap.shell_diameters=4"],
+        &["overlap.shell_diameters", "= 4", "buffer"],
+    ),
+    (
+        &["run", "incline", "--set", "overlap.from=3"],
+        &["overlap.from", "3", "time.relax"],
+    ),
+    (
+        &["run", "incline", "--set", "overlap.load_time=0.01"],
+        &["overlap.load_time", "0.01", "at most"],
+    ),
+    (
+        &["run", "incline", "--set", "overlap.normal_motion=sinking"],
+        &["overlap.normal_motion", "sinking", "held, riding"],
+    ),
+    (
+        &["run", "incline", "--set", "overlap.impedance=-1"],
+        &["overlap.impedance", "-1", "[0"],
+    ),
+    (
+        &["run", "incline", "--set", "rheology.mu_2=0.1"],
+        &["rheology.mu_2", "0.1", "mu_s"],
+    ),
+    (
+        &["run", "incline", "--set", "rheology.file=\"nowhere.toml\""],
+        &["rheology.file", "nowhere.toml", "moderate"],
+    ),
+    (
+        &["run", "incline", "--set", "rheology.law=table"],
+        &["rheology.law", "table", "mu-i"],
+    ),
+    (&["calibrate", "incline"], &["model", "hybrid", "dem"]),
+    (
         &["run", "incline-moderate", "--set", "slope_degrees=90"],
         &["slope_degrees", "90", "[0, 90)"],
     ),

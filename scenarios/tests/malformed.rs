@@ -73,7 +73,7 @@ fn laid_over(lower: &toml::Table, upper: toml::Table) -> toml::Table {
 }
 
 /// Keys that the bundled scene does not give, but the kind reads.
-const FURTHER: [(&str, &[&str]); 5] = [
+const FURTHER: [(&str, &[&str]); 6] = [
     (
         "bagnold",
         &[
@@ -110,6 +110,23 @@ const FURTHER: [(&str, &[&str]); 5] = [
             "contact.youngs_modulus",
             "rolling.beta",
             "rolling",
+        ],
+    ),
+    (
+        "incline",
+        &[
+            "overlap.cell_diameters",
+            "overlap.inner_diameters",
+            "overlap.buffer_diameters",
+            "overlap.shell_diameters",
+            "overlap.kernel_diameters",
+            "overlap.stress_time",
+            "overlap.exchange_time",
+            "overlap.load_time",
+            "overlap.impedance",
+            "overlap.normal_motion",
+            "rheology.mu_s",
+            "rheology.solid_fraction",
         ],
     ),
     (

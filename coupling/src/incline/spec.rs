@@ -206,6 +206,20 @@ impl InclineSpec {
         tops.fold(0.0, f64::max)
     }
 
+    /// The velocity that a flowing start of this depth (m) has at a height (m): Bagnold's profile with a loose φ,
+    /// u(z) = (2/3)(I/d) √(φ g cos θ) [H^{3/2} − (H − z)^{3/2}].
+    pub fn starting_flow(&self, depth: f64) -> Option<impl Fn(f64) -> f64 + use<>> {
+        let Start::Flow { inertial_number } = self.start else {
+            return None;
+        };
+        let scale = 2.0 / 3.0 * inertial_number / self.diameter
+            * (FLOWING_SOLID_FRACTION * self.gravity * self.slope.cos()).sqrt();
+        Some(move |height: f64| {
+            let z = height.clamp(0.0, depth);
+            scale * (depth.powf(1.5) - (depth - z).powf(1.5))
+        })
+    }
+
     /// Time between samples (s).
     pub fn sample_interval(&self) -> f64 {
         self.sample_every as f64 * self.timestep

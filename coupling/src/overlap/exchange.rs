@@ -7,7 +7,7 @@ use super::shell::Given;
 use super::strip::Strip;
 use super::{Ledger, Overlap, OverlapError};
 use colluvium_continuum::rheology::ShearLaw;
-use colluvium_dem::{Partner, Simulation};
+use colluvium_dem::Simulation;
 
 impl<L: ShearLaw + Copy> Overlap<L> {
     /// Opens the ledger with what there is now.
@@ -29,9 +29,21 @@ impl<L: ShearLaw + Copy> Overlap<L> {
     /// # Errors
     /// If the grains fly apart or the continuum's step fails.
     pub fn advance(&mut self, simulation: &mut Simulation, steps: u64) -> Result<(), OverlapError> {
-        for _ in 0..steps {
-            self.step_grains(simulation)?;
-            self.made += 1;
+        let mut left = steps;
+        while left > 0 {
+            let of_loads = self.made % self.steps_of_loads;
+            if of_loads == 0 {
+                self.shell.lay(
+                    simulation,
+                    (&self.edge, &self.strip),
+                    (self.settings.impedance, self.normal_velocity),
+                    &self.held,
+                )?;
+            }
+            let part = left.min(self.steps_of_loads - of_loads);
+            self.step_grains(simulation, part)?;
+            left -= part;
+            self.made += part;
             if self.made == self.steps {
                 self.exchange(simulation)?;
                 self.made = 0;
@@ -40,29 +52,27 @@ impl<L: ShearLaw + Copy> Overlap<L> {
         Ok(())
     }
 
-    /// One step of the grains under what is held.
-    fn step_grains(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
-        let impedance = self.settings.impedance;
-        let kick = simulation.next_kick();
-        let before = self.given.impedance;
-        self.shell.lay(
-            simulation,
-            (&self.edge, &self.strip),
-            (impedance, self.normal_velocity),
-            &self.held,
-            &mut self.given,
-        )?;
+    /// Steps of the grains under what is laid. Books are kept step by step, so that pieces give the same bits.
+    fn step_grains(&mut self, simulation: &mut Simulation, steps: u64) -> Result<(), OverlapError> {
         let gravity = simulation.gravity();
         let n = self.edge.normal(&gravity);
-        self.ledger.weight[0] += kick * self.grain_mass * gravity[self.edge.flow_axis];
-        self.ledger.weight[1] += kick * self.grain_mass * gravity.dot(&n);
-        simulation.advance(1)?;
-        if self.settings.normal_motion == NormalMotion::Riding {
-            let taken = before - self.given.impedance;
-            self.normal_velocity += taken / self.mass_beyond;
-            self.ledger.riding += taken;
-            self.edge
-                .shift(self.normal_velocity * simulation.timestep());
+        let weight = [gravity[self.edge.flow_axis], gravity.dot(&n)].map(|g| self.grain_mass * g);
+        let timestep = simulation.timestep();
+        let mut kick = simulation.next_kick();
+        simulation.advance(steps)?;
+        for _ in 0..steps {
+            self.given.add(&self.shell.laid, kick);
+            self.shell.acted += kick;
+            for (sum, weight) in self.ledger.weight.iter_mut().zip(weight) {
+                *sum += kick * weight;
+            }
+            if self.settings.normal_motion == NormalMotion::Riding {
+                let taken = -self.shell.laid.impedance * kick;
+                self.normal_velocity += taken / self.mass_beyond;
+                self.ledger.riding += taken;
+                self.edge.shift(self.normal_velocity * timestep);
+            }
+            kick = timestep;
         }
         Ok(())
     }
@@ -70,7 +80,7 @@ impl<L: ShearLaw + Copy> Overlap<L> {
     /// Averages of the grains to the continuum, its step, and what it does to the grains until the next exchange.
     fn exchange(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
         let dt = self.exchange_time(simulation);
-        self.look(simulation);
+        self.sighting.look(simulation);
         self.sample(dt / self.settings.stress_time);
         self.step_continuum(dt)?;
         self.book(dt);
@@ -80,41 +90,23 @@ impl<L: ShearLaw + Copy> Overlap<L> {
         self.agree(simulation);
         let area = self.edge.area();
         let relaxation: f64 = self.given.relaxation.iter().sum();
+        let (edge, cell) = (&self.edge, self.strip.cell);
+        let grains = self.sighting.snapshot.grains.iter();
+        let escaped = grains.filter(|g| !g.fixed && edge.distance(&g.position) > cell);
         self.monitors.take(
             &self.averages,
             &self.continuum,
             (&self.strip, area),
             [relaxation, self.given.shear],
-            self.shell.beyond,
+            escaped.count(),
         );
-        self.given.relaxation.fill(0.0);
-        self.given.spin.fill(0.0);
-        let given = &mut self.given;
-        (given.shear, given.pressure, given.impedance, given.time) = (0.0, 0.0, 0.0, 0.0);
+        self.given.clear();
         Ok(())
-    }
-
-    /// Takes a snapshot whose bits do not depend on the order of the grains' lists, which a restart may change: contacts
-    /// are sorted, and velocities are those that the integrator holds, half a step back, free of sums of forces.
-    pub(super) fn look(&mut self, simulation: &mut Simulation) {
-        simulation.snapshot(&mut self.snapshot);
-        self.snapshot.contacts.sort_unstable_by_key(|contact| {
-            let (kind, other) = match contact.partner {
-                Partner::Grain(other) => (0, other),
-                Partner::Wall(other) => (1, other),
-                Partner::Body(other) => (2, other),
-            };
-            (contact.grain, kind, other)
-        });
-        let held = simulation.held(|_| true);
-        for (seen, held) in self.snapshot.grains.iter_mut().zip(held) {
-            (seen.velocity, seen.spin) = (held.velocity, held.spin);
-        }
     }
 
     pub(super) fn sample(&mut self, lapse: f64) {
         let sight = Sight {
-            snapshot: &self.snapshot,
+            snapshot: &self.sighting.snapshot,
             edge: &self.edge,
             strip: &self.strip,
             continuum: self.continuum.velocities(),
@@ -124,7 +116,11 @@ impl<L: ShearLaw + Copy> Overlap<L> {
 
     pub(super) fn step_continuum(&mut self, dt: f64) -> Result<(), OverlapError> {
         let (averages, given, strip) = (&self.averages, &self.given, &self.strip);
-        let (area, weight) = (self.edge.area(), dt * self.gravity_along());
+        let area = self.edge.area();
+        let weight = match self.settings.uncoupled {
+            true => 0.0,
+            false => dt * self.gravity_along(),
+        };
         let cell_mass = area * self.continuum.cell_mass();
         self.continuum.step(
             dt,
@@ -142,7 +138,7 @@ impl<L: ShearLaw + Copy> Overlap<L> {
     }
 
     fn gravity_along(&self) -> f64 {
-        self.snapshot.gravity[self.edge.flow_axis]
+        self.sighting.snapshot.gravity[self.edge.flow_axis]
     }
 
     /// Books what the grains' kicks and the continuum's step have done.
@@ -156,15 +152,23 @@ impl<L: ShearLaw + Copy> Overlap<L> {
         ledger.spin += given.spin.iter().sum::<f64>();
         let cells = self.continuum.cells();
         let beyond = (cells - self.strip.nodes()) as f64;
-        let copy: f64 = self.averages.nodes.iter().map(|node| node.mass).sum();
-        let mass = copy + beyond * area * self.continuum.cell_mass();
-        ledger.continuum_weight += dt * mass * gravity;
-        ledger.inner_stress -= dt * area * self.averages.faces[0].shear;
+        let cell = area * self.continuum.cell_mass();
+        let copy = match self.settings.uncoupled {
+            true => self.strip.nodes() as f64 * cell,
+            false => self.averages.nodes.iter().map(|node| node.mass).sum(),
+        };
+        ledger.continuum_weight += dt * (copy + beyond * cell) * gravity;
+        if !self.settings.uncoupled {
+            ledger.inner_stress -= dt * area * self.averages.faces[0].shear;
+        }
         ledger.far_stress += dt * area * self.continuum.shear_stress(cells);
     }
 
     /// The copy in the inner overlap follows the grains.
     fn follow(&mut self, dt: f64) {
+        if self.settings.uncoupled {
+            return;
+        }
         let part = (dt / self.settings.following_time).min(1.0);
         let mass = self.edge.area() * self.continuum.cell_mass();
         for k in 0..self.strip.inner {
@@ -177,6 +181,9 @@ impl<L: ShearLaw + Copy> Overlap<L> {
 
     /// Takes the continuum's traction, and forms the accelerations that bring mean velocities and spins together.
     pub(super) fn agree(&mut self, simulation: &Simulation) {
+        if self.settings.uncoupled {
+            return;
+        }
         let dt = self.exchange_time(simulation);
         let edge_face = self.strip.nodes();
         self.held.shear = self.continuum.shear_stress(edge_face);

@@ -70,7 +70,7 @@ impl<L: ShearLaw + Copy> ForceBlending<L> {
             strip,
             continuum: start.continuum,
             density,
-            snapshot: start.snapshot,
+            snapshot: start.sighting.snapshot,
             extra: Vec::new(),
             loads: Vec::new(),
             stresses: [vec![0.0; faces], vec![0.0; faces]],

@@ -33,6 +33,7 @@ mod monitors;
 mod record;
 mod settings;
 mod shell;
+mod sighting;
 mod start;
 mod strip;
 
@@ -47,8 +48,9 @@ pub use strip::Strip;
 
 use colluvium_continuum::grid::Boundary;
 use colluvium_continuum::rheology::ShearLaw;
-use colluvium_dem::{Diverged, Record, SetupError, Simulation, Snapshot};
+use colluvium_dem::{Diverged, Record, SetupError, Simulation};
 use shell::{Given, Shell};
+use sighting::Sighting;
 use start::Start;
 
 /// Why an overlap cannot be made or go on.
@@ -85,6 +87,9 @@ pub struct OverlapSpec<L> {
     pub edge: FlatEdge,
     /// Material of the continuum.
     pub rheology: L,
+    /// Mass of grains and continuum together (kg), of which the continuum is what the grains inside the edge lack;
+    /// none: that of all free grains, those beyond the edge included.
+    pub mass: Option<f64>,
     /// What holds at its far end.
     pub far_end: Boundary,
     /// What defaults are formed from.
@@ -93,6 +98,12 @@ pub struct OverlapSpec<L> {
     pub settings: OverlapSettings,
     /// Strain-rate floor of the continuum's yield step, in √(g/H).
     pub strain_rate_floor: f64,
+}
+
+/// Share of the grains' stress on a face of the copy.
+fn shares<L>(spec: &OverlapSpec<L>) -> impl Fn(&Strip, usize) -> f64 + use<L> {
+    let uncoupled = spec.settings.uncoupled;
+    move |strip, face| if uncoupled { 0.0 } else { strip.share(face) }
 }
 
 /// Grains and continuum joined at one edge. The grains are the caller's: every call needs the same simulation.
@@ -107,8 +118,10 @@ pub struct Overlap<L> {
     given: Given,
     monitors: Monitors,
     ledger: Ledger,
-    /// Steps of the grains in one of the continuum, and those made since the last exchange.
+    /// Steps of the grains in one of the continuum, those for which loads are held, and those made since the last
+    /// exchange.
     steps: u64,
+    steps_of_loads: u64,
     made: u64,
     /// Velocity of the continuum along n (m/s).
     normal_velocity: f64,
@@ -116,7 +129,7 @@ pub struct Overlap<L> {
     mass_beyond: f64,
     /// Mass of the free grains (kg).
     grain_mass: f64,
-    snapshot: Snapshot,
+    sighting: Sighting,
 }
 
 impl<L: ShearLaw + Copy> Overlap<L> {
@@ -129,13 +142,30 @@ impl<L: ShearLaw + Copy> Overlap<L> {
         spec: OverlapSpec<L>,
         simulation: &mut Simulation,
     ) -> Result<Self, OverlapError> {
-        let start = Start::of(&spec, simulation, |strip, f| strip.share(f))?;
+        Self::begin(spec, simulation, None)
+    }
+
+    /// The same, with these velocities of the continuum (m/s) over its coordinate along the normal (m), or those of
+    /// the grains it takes the places of.
+    fn begin(
+        spec: OverlapSpec<L>,
+        simulation: &mut Simulation,
+        velocity: Option<&dyn Fn(f64) -> f64>,
+    ) -> Result<Self, OverlapError> {
+        let share = shares(&spec);
+        let mut start = Start::of(&spec, simulation, share)?;
+        if let Some(velocity) = velocity {
+            for k in 0..start.continuum.cells() {
+                let place = spec.edge.position + spec.edge.sign() * start.strip.node(k);
+                start.continuum.set_velocity(k, velocity(place));
+            }
+        }
         let edge = start.edge;
         let mut overlap = Self::around(start, simulation);
         // Stresses as they are while all grains are still there.
         overlap.sample(1.0);
         if overlap.settings.normal_motion == NormalMotion::Riding {
-            let (grains, a) = (&overlap.snapshot.grains, overlap.strip.face(0));
+            let (grains, a) = (&overlap.sighting.snapshot.grains, overlap.strip.face(0));
             overlap.normal_velocity = averages::normal_velocity(grains, &edge, a);
         }
         simulation.remove(|g| !g.fixed && edge.distance(&g.position) > 0.0);
@@ -157,7 +187,7 @@ impl<L: ShearLaw + Copy> Overlap<L> {
         record: &Record,
     ) -> Result<Self, OverlapError> {
         let (cells, mass_beyond) = record::cells(record).map_err(OverlapError::Record)?;
-        let share = |strip: &Strip, f: usize| strip.share(f);
+        let share = shares(&spec);
         let start = Start::of_cells(&spec, simulation, cells, mass_beyond, share)?;
         let mut overlap = Self::around(start, simulation);
         overlap.take_up(record)?;
@@ -172,35 +202,35 @@ impl<L: ShearLaw + Copy> Overlap<L> {
             strip,
             continuum,
             mass_beyond,
-            snapshot,
+            sighting,
         } = start;
         let nodes = strip.nodes();
-        let steps = (settings.exchange_time / simulation.timestep()).round();
+        let of_loads = (settings.load_time / simulation.timestep())
+            .round()
+            .max(1.0);
+        let loads = (settings.exchange_time / (of_loads * simulation.timestep())).round();
         Self {
             averages: Averages::new(&strip, settings.kernel),
             settings,
             edge,
             strip,
             continuum,
-            shell: Shell::new(simulation.grain_count()),
+            shell: Shell::new(simulation.grain_count(), nodes),
             held: Held {
                 accelerations: vec![0.0; nodes],
                 spins: vec![0.0; nodes],
                 ..Held::default()
             },
-            given: Given {
-                relaxation: vec![0.0; nodes],
-                spin: vec![0.0; nodes],
-                ..Given::default()
-            },
+            given: Given::nothing(nodes),
             monitors: Monitors::default(),
             ledger: Ledger::default(),
-            steps: steps.max(1.0) as u64,
+            steps: (of_loads * loads.max(1.0)) as u64,
+            steps_of_loads: of_loads as u64,
             made: 0,
             normal_velocity: 0.0,
             mass_beyond,
             grain_mass: simulation.free_mass(),
-            snapshot,
+            sighting,
         }
     }
 
@@ -258,8 +288,8 @@ impl<L: ShearLaw + Copy> Overlap<L> {
     }
 
     /// Work of what acts on the grains since the start (J).
-    pub fn work(&self) -> Work {
-        self.shell.work
+    pub fn work(&self, simulation: &Simulation) -> Work {
+        self.shell.work_until_now(simulation)
     }
 
     /// Velocity of the continuum along n (m/s).
@@ -267,9 +297,14 @@ impl<L: ShearLaw + Copy> Overlap<L> {
         self.normal_velocity
     }
 
-    /// Accounts since the start.
-    pub fn ledger(&self) -> &Ledger {
-        &self.ledger
+    /// Accounts since the start, with what the grains have been given since the last exchange.
+    pub fn ledger(&self) -> Ledger {
+        let mut ledger = self.ledger;
+        ledger.shear += self.given.shear;
+        ledger.pressure += self.given.pressure;
+        ledger.impedance += self.given.impedance;
+        ledger.relaxation += self.given.relaxation.iter().sum::<f64>();
+        ledger
     }
 
     /// Starts the monitors anew.
@@ -282,15 +317,19 @@ impl<L: ShearLaw + Copy> Overlap<L> {
         self.monitors.report()
     }
 
-    /// Relative errors of the ledger: mass, momentum of the grains, momentum of the continuum. Valid right after
-    /// an exchange ([`at_exchange`](Self::at_exchange)).
+    /// Relative errors of the ledger: mass, momentum of the grains, momentum of the continuum.
     pub fn ledger_errors(&self, simulation: &mut Simulation) -> [f64; 3] {
         let mass = simulation.free_mass() + self.mass_beyond;
         [
             (mass / self.ledger.mass_before - 1.0).abs(),
-            self.ledger.grains_error(self.grain_momentum(simulation)),
+            self.ledger().grains_error(self.grain_momentum(simulation)),
             self.ledger.continuum_error(self.continuum_momentum()),
         ]
+    }
+
+    /// Steps of the grains for which forces on them are held.
+    pub fn steps_of_loads(&self) -> u64 {
+        self.steps_of_loads
     }
 
     /// Steps of the grains in one step of the continuum.

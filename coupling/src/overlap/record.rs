@@ -1,13 +1,13 @@
 //! Checkpoints of an overlap: named arrays, bit-exact.
 
-use super::shell::PULL;
+use super::shell::{Given, PULL};
 use super::{FaceStress, Ledger, Monitors, Overlap, OverlapError, Work};
 use colluvium_continuum::rheology::ShearLaw;
 use colluvium_continuum::yield_step::FlowState;
 use colluvium_dem::Record;
 
 /// Numbers of the array `state`; the last is the height of a cell, the fourth the mass beyond the edge.
-const STATE: usize = 15;
+const STATE: usize = 12;
 
 /// Height of a cell and number of those beyond the edge, and the mass there.
 pub(super) fn cells(record: &Record) -> Result<((f64, usize), f64), String> {
@@ -45,9 +45,8 @@ impl<L: ShearLaw + Copy> Overlap<L> {
         numbers("continuum/s", flow.s.iter().flatten().copied().collect());
         numbers("held/accelerations", self.held.accelerations.clone());
         numbers("held/spins", self.held.spins.clone());
-        numbers("given/relaxation", self.given.relaxation.clone());
-        numbers("given/spin", self.given.spin.clone());
-        let given = &self.given;
+        numbers("given", self.given.numbers());
+        numbers("laid", self.shell.laid.numbers());
         let work = self.shell.work;
         numbers(
             "state",
@@ -58,14 +57,11 @@ impl<L: ShearLaw + Copy> Overlap<L> {
                 self.mass_beyond,
                 self.held.shear,
                 self.held.pressure,
-                given.shear,
-                given.pressure,
-                given.impedance,
-                given.time,
                 work.traction,
                 work.impedance,
                 work.relaxation,
-                self.shell.last_kick,
+                self.shell.acted,
+                self.grain_mass,
                 self.strip.cell,
             ],
         );
@@ -112,23 +108,22 @@ impl<L: ShearLaw + Copy> Overlap<L> {
             .accelerations
             .copy_from_slice(sized("held/accelerations", nodes)?);
         self.held.spins.copy_from_slice(sized("held/spins", nodes)?);
-        self.given
-            .relaxation
-            .copy_from_slice(sized("given/relaxation", nodes)?);
-        self.given.spin.copy_from_slice(sized("given/spin", nodes)?);
+        let given = |name: &str| {
+            let numbers = sized(name, 2 * nodes + 3)?;
+            Given::from_numbers(numbers, nodes)
+        };
+        (self.given, self.shell.laid) = (given("given")?, given("laid")?);
         self.edge.position = state[1];
         self.normal_velocity = state[2];
         self.mass_beyond = state[3];
         (self.held.shear, self.held.pressure) = (state[4], state[5]);
-        let given = &mut self.given;
-        (given.shear, given.pressure, given.impedance, given.time) =
-            (state[6], state[7], state[8], state[9]);
         self.shell.work = Work {
-            traction: state[10],
-            impedance: state[11],
-            relaxation: state[12],
+            traction: state[6],
+            impedance: state[7],
+            relaxation: state[8],
         };
-        self.shell.last_kick = state[13];
+        self.shell.acted = state[9];
+        self.grain_mass = state[10];
         let pulls = finite("pulls")?;
         if !pulls.len().is_multiple_of(PULL) {
             return Err(format!(

@@ -52,12 +52,18 @@ pub struct OverlapSettings {
     pub following_time: Option<f64>,
     /// Time in which mean spins in the buffer relax to half the vorticity (s). √(d/g).
     pub spin_time: Option<f64>,
-    /// Time step of the continuum (s), rounded to whole steps of the grains. 0.04 √(d/g).
+    /// Time step of the continuum (s), rounded to a whole number of `load_time`. 0.2 √(d/g).
     pub exchange_time: Option<f64>,
+    /// Time for which forces on the grains are held (s), rounded to whole steps of theirs: what the impedance
+    /// says is as old as that. 0.01 √(d/g), and at most 0.3 of [`Resolved::stopping_time`].
+    pub load_time: Option<f64>,
     /// Acoustic impedance Z of the edge (Pa s/m): [`Scales::impedance`].
     pub impedance: Option<f64>,
     /// Motion of the continuum along the normal: riding where its far end is free, held where it is not.
     pub normal_motion: Option<NormalMotion>,
+    /// Neither side acts on the other: grains end at a free surface, and the continuum slides on nothing. This is
+    /// what a coupling has to do better than.
+    pub uncoupled: bool,
 }
 
 /// What the defaults are formed from (SI).
@@ -106,10 +112,22 @@ pub struct Resolved {
     pub spin_time: f64,
     /// Time step of the continuum (s).
     pub exchange_time: f64,
+    /// Time for which forces on the grains are held (s).
+    pub load_time: f64,
     /// Impedance (Pa s/m).
     pub impedance: f64,
     /// Motion along the normal.
     pub normal_motion: NormalMotion,
+    /// Neither side acts on the other.
+    pub uncoupled: bool,
+}
+
+impl Resolved {
+    /// Time in which the impedance stops the shell (s), 3 ρ b/(4 Z): its force Z A v̄ goes to grains in proportion to
+    /// q, and v̄ is their mean by q, so that the mass it meets is (Σ q)²/Σ (q²/m) = 3 ρ A b/4.
+    pub fn stopping_time(&self, density: f64) -> f64 {
+        0.75 * density * self.shell / self.impedance
+    }
 }
 
 impl OverlapSettings {
@@ -127,7 +145,7 @@ impl OverlapSettings {
             check(key, value, value > 0.0, "positive")?;
         }
         let (d, t) = (scales.diameter, scales.time);
-        let resolved = Resolved {
+        let mut resolved = Resolved {
             cell: self.cell.unwrap_or(d),
             inner: self.inner.unwrap_or(3.0 * d),
             buffer: self.buffer.unwrap_or(3.0 * d),
@@ -137,13 +155,18 @@ impl OverlapSettings {
             relaxation_time: self.relaxation_time.unwrap_or(t),
             following_time: self.following_time.unwrap_or(t),
             spin_time: self.spin_time.unwrap_or(t),
-            exchange_time: self.exchange_time.unwrap_or(0.04 * t),
-            impedance: self.impedance.unwrap_or(scales.impedance()),
+            exchange_time: self.exchange_time.unwrap_or(0.2 * t),
+            load_time: 0.0,
+            impedance: match self.impedance {
+                _ if self.uncoupled => 0.0,
+                given => given.unwrap_or(scales.impedance()),
+            },
             normal_motion: self.normal_motion.unwrap_or(if free {
                 NormalMotion::Riding
             } else {
                 NormalMotion::Held
             }),
+            uncoupled: self.uncoupled,
         };
         let r = &resolved;
         for (key, value) in [
@@ -186,6 +209,24 @@ impl OverlapSettings {
                 "positive and at most the inner overlap's width",
             )?;
         }
+        let stopping = resolved.stopping_time(scales.density);
+        let held = (0.01 * t).min(0.3 * stopping).min(resolved.exchange_time);
+        resolved.load_time = self.load_time.unwrap_or(held);
+        let load_time = resolved.load_time;
+        check("load_time", load_time, load_time > 0.0, "positive")?;
+        check(
+            "load_time",
+            load_time,
+            load_time <= resolved.exchange_time,
+            "at most the time step of the continuum",
+        )?;
+        // From twice of it on the shell is thrown back by more than it came with.
+        check(
+            "load_time",
+            load_time,
+            load_time <= stopping,
+            "at most the time in which the impedance stops the shell, 3 ρ b/(4 Z)",
+        )?;
         Ok(resolved)
     }
 }

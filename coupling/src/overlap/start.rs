@@ -4,10 +4,11 @@ use super::averages::velocity_profile;
 use super::edge::{FlatEdge, ZoneEdge};
 use super::far_side::{FarSide, sets_pressure};
 use super::settings::{Resolved, check};
+use super::sighting::Sighting;
 use super::strip::Strip;
 use super::{OverlapError, OverlapSpec};
 use colluvium_continuum::rheology::ShearLaw;
-use colluvium_dem::{Simulation, Snapshot};
+use colluvium_dem::Simulation;
 
 /// Grains as they are and the continuum that takes over from those beyond the edge.
 pub(super) struct Start<L> {
@@ -18,7 +19,7 @@ pub(super) struct Start<L> {
     /// Mass of the grains beyond the edge (kg).
     pub mass_beyond: f64,
     /// All grains, those beyond the edge included.
-    pub snapshot: Snapshot,
+    pub sighting: Sighting,
 }
 
 impl<L: ShearLaw + Copy> Start<L> {
@@ -30,18 +31,24 @@ impl<L: ShearLaw + Copy> Start<L> {
         share: impl Fn(&Strip, usize) -> f64,
     ) -> Result<Self, OverlapError> {
         let edge = spec.edge;
-        let mut snapshot = Snapshot::default();
-        simulation.snapshot(&mut snapshot);
-        let free = snapshot.grains.iter().filter(|g| !g.fixed);
-        let leaves = free.filter(|g| edge.distance(&g.position) > 0.0);
-        let mass_beyond: f64 = leaves.map(|g| g.mass).sum();
+        let mut sighting = Sighting::default();
+        sighting.look(simulation);
+        let free = sighting.snapshot.grains.iter().filter(|g| !g.fixed);
+        let sums = free.fold([0.0; 2], |[stay, leave], g| {
+            if edge.distance(&g.position) > 0.0 {
+                [stay, leave + g.mass]
+            } else {
+                [stay + g.mass, leave]
+            }
+        });
+        let mass_beyond = spec.mass.map_or(sums[1], |mass| mass - sums[0]);
         let depth = mass_beyond / (spec.rheology.bulk_density() * edge.area());
         let cell = spec.resolved()?.cell;
         check(
             "edge.position",
             edge.position,
             depth >= cell,
-            "where grains of at least one cell's depth lie beyond it",
+            "where matter of at least one cell's depth lies beyond it",
         )?;
         let beyond = (depth / cell).round().max(1.0);
         let mut start = Self::of_cells(
@@ -51,9 +58,9 @@ impl<L: ShearLaw + Copy> Start<L> {
             mass_beyond,
             share,
         )?;
-        start.snapshot = snapshot;
+        start.sighting = sighting;
         let profile = velocity_profile(
-            &start.snapshot.grains,
+            &start.sighting.snapshot.grains,
             &edge,
             start.strip.face(0),
             start.strip.cell,
@@ -97,7 +104,7 @@ impl<L: ShearLaw + Copy> Start<L> {
             strip,
             continuum,
             mass_beyond,
-            snapshot: Snapshot::default(),
+            sighting: Sighting::default(),
         })
     }
 }

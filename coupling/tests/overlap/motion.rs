@@ -46,6 +46,7 @@ fn riding(edge: FlatEdge, rheology: MuI) -> OverlapSpec<MuI> {
     OverlapSpec {
         edge,
         rheology,
+        mass: None,
         far_end: Boundary::FreeSurface,
         scales: scales(rheology.bulk_density()),
         settings: OverlapSettings {
@@ -94,7 +95,7 @@ fn uniform_translation_is_free_of_forces() {
             }
             let normal = edge.sign() * velocity[axis];
             assert!((overlap.normal_velocity() - normal).abs() < 1e-11);
-            let work = overlap.work();
+            let work = overlap.work(&simulation);
             let total = work.traction.abs() + work.impedance.abs() + work.relaxation.abs();
             assert!(total < 1e-10, "{work:?}");
         }
@@ -115,7 +116,7 @@ fn a_jump_of_velocity_dies_out_at_equal_and_opposite_cost() {
     };
     // The grains of the buffer get a push of their own.
     simulation.give_velocity(|g| Vector3::x() * if g.position.z > 9.0 { 0.5 } else { 0.0 });
-    overlap.advance(&mut simulation, steps(0.08)).unwrap();
+    overlap.advance(&mut simulation, steps(0.2)).unwrap();
     let before = slip(&overlap);
     overlap.advance(&mut simulation, steps(4.0)).unwrap();
     assert!(
@@ -199,14 +200,15 @@ fn shear(bed: &Bed, height: f64, window: [f64; 2]) -> Sheared {
     sheared
 }
 
-fn is_handed_over(sheared: &Sheared, rates: f64) {
+/// Rates and the ratio of shear stresses at m within these.
+fn is_handed_over(sheared: &Sheared, rates: f64, ratio: f64) {
     let [below, inner, _] = sheared.grains;
     for rate in [inner, sheared.continuum[0], sheared.continuum[1]] {
         assert!((rate / below - 1.0).abs() < rates, "{rate} {below}");
     }
     let report = &sheared.report;
     assert!(report.slip.abs() < 0.015, "{report:?}");
-    assert!((report.shear_ratio - 1.0).abs() < 0.05, "{report:?}");
+    assert!((report.shear_ratio - 1.0).abs() < ratio, "{report:?}");
     for pressure in sheared.pressure {
         assert!((pressure - 1.0).abs() < 0.03, "{pressure}");
     }
@@ -215,10 +217,10 @@ fn is_handed_over(sheared: &Sheared, rates: f64) {
 }
 
 /// Seven diameters over the base its heat still speeds up the grains next to the overlap, and rates over three layers in
-/// so short a window scatter by a tenth.
+/// so short a window scatter by a fifth.
 #[test]
 fn plane_shear_keeps_stress_density_and_velocity() {
-    is_handed_over(&shear(small_bed(), 10.0, [20.0, 30.0]), 0.3);
+    is_handed_over(&shear(small_bed(), 10.0, [20.0, 30.0]), 0.45, 0.12);
 }
 
 /// Velocity, stress and density go over without a step. The shear rate does not quite: in two runs that differ in the last
@@ -226,5 +228,5 @@ fn plane_shear_keeps_stress_density_and_velocity() {
 #[test]
 #[ignore = "half a minute; run by tests/validate.sh"]
 fn plane_shear_of_a_deep_layer_keeps_stress_density_and_velocity() {
-    is_handed_over(&shear(deep_bed(), 16.0, [40.0, 60.0]), 0.25);
+    is_handed_over(&shear(deep_bed(), 16.0, [40.0, 60.0]), 0.25, 0.05);
 }

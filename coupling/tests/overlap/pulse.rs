@@ -144,7 +144,6 @@ fn returned(pulse: &Pulse, impedances: &[f64]) -> Returned {
         let settings = OverlapSettings {
             impedance,
             normal_motion: Some(normal_motion),
-            exchange_time: Some(STEP),
             ..Default::default()
         };
         let mut simulation = rest.clone();

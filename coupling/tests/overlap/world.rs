@@ -132,6 +132,7 @@ impl Bed {
         OverlapSpec {
             edge: FlatEdge::across(&self.domain, 2, 0, true, 0.0),
             rheology,
+            mass: None,
             far_end: Boundary::FreeSurface,
             scales: scales(rheology.bulk_density()),
             settings,

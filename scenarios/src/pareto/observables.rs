@@ -41,6 +41,16 @@ pub fn errors(scene: &Scene, run: &Path, reference: &Path) -> Result<Errors, Fai
             ("deposit".to_owned(), curve(run, reference, DEPOSIT)),
             ("front".to_owned(), result(run, reference, "x_front")?),
         ],
+        SceneBody::Incline(ref body) if body.rheology.is_some() => [
+            ("velocity", "u"),
+            ("normal_stress", "sigma_zz"),
+            ("shear_stress", "tau"),
+        ]
+        .map(|(name, column)| {
+            let [file, z, _] = PROFILE;
+            (name.to_owned(), curve(run, reference, [file, z, column]))
+        })
+        .to_vec(),
         SceneBody::Incline(_) | SceneBody::Bagnold(_) => {
             vec![("velocity".to_owned(), curve(run, reference, PROFILE))]
         }
@@ -89,6 +99,9 @@ pub fn against_reference(scene: &Scene) -> String {
         }
         SceneBody::Collapse(_) => {
             "the reference run; the larger of the relative L2 error of the deposit's height and the relative error of the front".to_owned()
+        }
+        SceneBody::Incline(body) if body.rheology.is_some() => {
+            "the reference run; largest relative L2 error through the depth of velocity, normal and shear stress".to_owned()
         }
         _ => "the reference run".to_owned(),
     }

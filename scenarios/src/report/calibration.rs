@@ -8,6 +8,7 @@ use super::page::{figure, number, with_error};
 use super::plot::{Band, Mark, Plot};
 use super::{Record, results};
 use crate::calibrate::{CAMPAIGN, published_material};
+pub use crate::rheology_file::FrictionOf;
 use crate::scene::Scene;
 use colluvium_coupling::calibration::MuIFit;
 use colluvium_coupling::campaign::CampaignResult;
@@ -30,16 +31,6 @@ pub struct Campaign {
     pub gravity: f64,
     /// Mean diameter (m).
     pub diameter: f64,
-}
-
-/// Which friction a continuum run was given.
-#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum FrictionOf {
-    /// |τ|/p, p = trace/3.
-    Pressure,
-    /// |τ|/σ_zz.
-    NormalStress,
 }
 
 /// A continuum layer at the slope and depth of one flow of grains.

@@ -1,6 +1,7 @@
 //! Plots of single runs and comparisons.
 
 mod collapse;
+mod joined_incline;
 
 use super::Record;
 use super::page::{figure, number};
@@ -19,7 +20,9 @@ pub fn plots(record: &Record) -> Markup {
             (collapse::collapse(&table, record.table("front").as_ref()))
         }
         @if let Some(table) = record.table("trajectory") { (trajectory(&table)) }
-        @if let Some(table) = record.table("profile") {
+        @if let (Some(grains), Some(continuum)) = (record.table("profile_grains"), record.table("profile_continuum")) {
+            (joined_incline::profiles(record, &grains, &continuum))
+        } @else if let Some(table) = record.table("profile") {
             @if table.column("u_exact").is_empty() {
                 (grains(&table, record.table("energy").as_ref()))
             } @else {

@@ -21,10 +21,10 @@ use nalgebra::Vector3;
 use std::ops::ControlFlow;
 
 /// Steps between two looks at the clock.
-const STEPS_PER_LOOK: u64 = 500;
+pub(super) const STEPS_PER_LOOK: u64 = 500;
 
 /// Name of the stage in a checkpoint.
-const STAGE: &str = "flow";
+pub(super) const STAGE: &str = "flow";
 
 /// What the scene does not name and is not computed.
 pub fn left_out(scene: &InclineScene) -> Vec<String> {
@@ -142,9 +142,9 @@ pub fn spec(scene: &InclineScene, bed: &Bed, threads: Threads) -> InclineSpec {
     }
 }
 
-/// Lets the bed settle; gives nothing if the user stopped it.
-pub fn settle(scene: &InclineScene, threads: Threads, bar: &Bar) -> Result<Option<Bed>, Failure> {
-    let settled = settle_incline_bed(&bed(scene), threads, &mut |share| {
+/// Lets a bed settle; gives nothing if the user stopped it.
+pub fn settle(bed: &InclineBed, threads: Threads, bar: &Bar) -> Result<Option<Bed>, Failure> {
+    let settled = settle_incline_bed(bed, threads, &mut |share| {
         bar.set(share);
         if interruption::requested() {
             ControlFlow::Break(())
@@ -158,6 +158,18 @@ pub fn settle(scene: &InclineScene, threads: Threads, bar: &Bar) -> Result<Optio
         Err(SetupError::Diverged(error)) => Err(Failure::Run(error.to_string())),
         Err(error) => Err(Failure::Input(error.to_string())),
     }
+}
+
+/// How a bed has settled, in words.
+pub fn settled(bed: &Bed) -> String {
+    format!(
+        "bed: {} grains over {} fixed, depth {:.4} m, solid fraction {:.4}, {:.2} contacts a grain",
+        bed.report.grains,
+        bed.report.base_grains,
+        bed.report.depth,
+        bed.report.solid_fraction,
+        bed.report.coordination
+    )
 }
 
 /// What an error of a run means for the process.
@@ -177,18 +189,11 @@ pub(super) fn run(scene: &InclineScene, under: &mut Under) -> Result<Findings, F
     }
     let bar = Bar::new("settling the bed");
     // The bed is not kept: the same seed gives the same bits again.
-    let Some(bed) = settle(scene, threads, &bar)? else {
+    let Some(bed) = settle(&bed(scene), threads, &bar)? else {
         return Err(under.interrupted());
     };
     bar.clear();
-    under.directory.journal.note(&format!(
-        "bed: {} grains over {} fixed, depth {:.4} m, solid fraction {:.4}, {:.2} contacts a grain",
-        bed.report.grains,
-        bed.report.base_grains,
-        bed.report.depth,
-        bed.report.solid_fraction,
-        bed.report.coordination
-    ));
+    under.directory.journal.note(&settled(&bed));
     let spec = spec(scene, &bed, threads);
     let mut run = match &under.resumed {
         Some(saved) => InclineRun::resume(spec.clone(), &saved.record),
@@ -280,6 +285,10 @@ fn describe(summary: &mut Summary, scene: &InclineScene, result: &InclineResult,
         Quantity::new(f64::from(u8::from(result.flows())), "1").from("1 = yes"),
     );
     summary.put("height", Quantity::new(result.height, "m"));
+    summary.put(
+        "grain_steps_settling",
+        Quantity::new(bed.report.grain_steps as f64, "1").from("for the bed of grains"),
+    );
     summary.put(
         "bed_solid_fraction",
         Quantity::new(bed.report.solid_fraction, "1").from("at rest"),

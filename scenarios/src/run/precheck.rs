@@ -1,8 +1,8 @@
 //! What can be wrong with an incline or a campaign, found before anything is written.
 
-use super::{incline, step};
+use super::{continuum_incline, incline, joined_incline, step};
 use crate::failure::Failure;
-use crate::scene::{InclineScene, Scene, SceneError};
+use crate::scene::{InclineModel, InclineScene, Scene, SceneError};
 use colluvium_coupling::campaign::{CampaignError, CampaignSpec};
 use colluvium_coupling::incline::{InclineError, InclineRun};
 use colluvium_dem::preparation::{Bed, BedReport};
@@ -42,9 +42,13 @@ pub fn incline(scene: &Scene, body: &InclineScene) -> Result<(), Failure> {
     let safety = body.timestep.safety;
     step::check(scene, &step, step.seconds, "timestep.safety", safety)?;
     let spec = incline::spec(body, &stand_in_bed(body), Threads::Serial);
-    match InclineRun::new(spec) {
-        Ok(_) => Ok(()),
-        Err(error) => Err(explain(scene, error)),
+    if let Err(error) = InclineRun::new(spec) {
+        return Err(explain(scene, error));
+    }
+    match body.model {
+        InclineModel::Dem => Ok(()),
+        InclineModel::Continuum => continuum_incline::check(scene, body),
+        InclineModel::Hybrid => joined_incline::check(scene, body),
     }
 }
 
@@ -63,7 +67,7 @@ pub fn campaign(scene: &Scene, spec: &CampaignSpec) -> Result<(), Failure> {
 }
 
 /// An error of a run in the words of the scene.
-fn explain(scene: &Scene, error: InclineError) -> Failure {
+pub(super) fn explain(scene: &Scene, error: InclineError) -> Failure {
     match error {
         InclineError::OutOfRange {
             key,

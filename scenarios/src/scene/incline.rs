@@ -1,6 +1,7 @@
 //! Keys of the inclined-plane scenes.
 
-use super::{LEAST_MASS, SceneError};
+use super::overlap::{InclineModel, OverlapKeys};
+use super::{LEAST_MASS, RheologyKeys, SceneError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -8,6 +9,9 @@ use serde::{Deserialize, Serialize};
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct InclineScene {
+    /// What the layer is made of.
+    #[serde(default)]
+    pub model: InclineModel,
     /// Inclination of the plane to the horizontal (degrees).
     #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 90.0))]
     pub slope_degrees: f64,
@@ -35,6 +39,12 @@ pub struct InclineScene {
     pub timestep: TimestepKeys,
     /// How long it runs.
     pub time: TimeKeys,
+    /// The continuum's material.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub rheology: Option<RheologyKeys>,
+    /// Where grains end and continuum begins.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub overlap: Option<OverlapKeys>,
     /// Angles of a calibration campaign.
     pub calibration: CalibrationKeys,
 }
@@ -420,6 +430,7 @@ impl InclineScene {
                 format!("above calibration.guess.mu_s = {}", guess.mu_s),
             );
         }
+        self.check_model(origin)?;
         let rolling_without_friction =
             self.contact.friction == 0.0 && self.contact.rolling.is_some();
         if rolling_without_friction {

@@ -1,90 +1,21 @@
 //! An inclined-plane run whose upper part becomes continuum on the way.
 //!
 //! Grains alone flow until a given time; then all above the edge is handed over, and the joined flow goes on and is
-//! averaged. Axes as in [`crate::incline`].
+//! averaged. Or the upper part is continuum from the start, and no grain of it is ever made. Axes as in
+//! [`crate::incline`].
 
-use super::{
-    FlatEdge, Ledger, Overlap, OverlapError, OverlapSettings, OverlapSpec, Report, Scales, Work,
-};
-use crate::coarse_graining::{Averager, AveragerError, Layering, Layers, Profile};
-use crate::incline::{InclineError, InclineRun, InclineSpec};
-use colluvium_continuum::grid::Boundary;
+mod result;
+mod spec;
+
+pub use result::{ContinuumRow, HistoryPoint, JoinedInclineResult};
+pub use spec::{JoinedInclineError, JoinedInclineSpec};
+
+use super::{Overlap, OverlapError};
+use crate::coarse_graining::{Averager, Layers};
+use crate::incline::InclineRun;
 use colluvium_continuum::rheology::MuI;
-use colluvium_dem::{Record, Simulation, Snapshot, StateHash};
-
-/// What to run.
-#[derive(Clone, Debug)]
-pub struct JoinedInclineSpec {
-    /// The run of grains that it begins as; averages are taken over its `average_time` from its `relax_time` on.
-    pub incline: InclineSpec,
-    /// Height of the edge above the base (m).
-    pub height: f64,
-    /// When the continuum takes over (s).
-    pub from: f64,
-    /// Material of the continuum.
-    pub rheology: MuI,
-    /// Normal stiffness of a contact of two mean grains (N/m).
-    pub stiffness: f64,
-    /// Settings of the overlap.
-    pub settings: OverlapSettings,
-}
-
-/// Why such a run cannot be made or go on.
-#[derive(Clone, Debug, PartialEq, thiserror::Error)]
-pub enum JoinedInclineError {
-    /// The overlap.
-    #[error(transparent)]
-    Overlap(#[from] OverlapError),
-    /// The grains.
-    #[error(transparent)]
-    Incline(#[from] InclineError),
-}
-
-impl From<AveragerError> for JoinedInclineError {
-    fn from(error: AveragerError) -> Self {
-        JoinedInclineError::Incline(error.into())
-    }
-}
-
-/// Mean of the continuum in one cell.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct ContinuumRow {
-    /// Middle of the cell (m).
-    pub z: f64,
-    /// Velocity along the flow (m/s).
-    pub u: f64,
-    /// Pressure (Pa).
-    pub p: f64,
-    /// Shear stress of the continuum's own (Pa): the mean of the two faces.
-    pub tau: f64,
-    /// Whether the cell is part of the copy, where grains are too.
-    pub is_copy: bool,
-}
-
-/// What came out.
-#[derive(Clone, Debug)]
-pub struct JoinedInclineResult {
-    /// Averages of the grains; in the shell their stress is not that of the flow.
-    pub profile: Profile,
-    /// Averages of the continuum, from below.
-    pub continuum: Vec<ContinuumRow>,
-    /// What the monitors say of the averaging time.
-    pub report: Report,
-    /// Accounts since the continuum took over.
-    pub ledger: Ledger,
-    /// Errors of mass and of the momenta of grains and continuum, relative.
-    pub ledger_errors: [f64; 3],
-    /// Work of the exchange on the grains (J).
-    pub work: Work,
-    /// Grains left, the fixed ones included, and cells.
-    pub sizes: [usize; 2],
-    /// Steps of all grains together, and of all cells.
-    pub work_done: [u64; 2],
-    /// Height of the edge at the end, and of the continuum's surface (m).
-    pub heights: [f64; 2],
-    /// Hash of grains and continuum.
-    pub state_hash: String,
-}
+use colluvium_dem::{Record, Simulation, StateHash};
+use nalgebra::Vector3;
 
 enum Stage {
     /// Grains alone.
@@ -97,9 +28,9 @@ struct Joined {
     simulation: Simulation,
     overlap: Overlap<MuI>,
     averager: Averager<Layers>,
-    snapshot: Snapshot,
     /// Σ u, Σ p, Σ τ by cell, from a outwards.
     sums: Vec<[f64; 3]>,
+    history: Vec<HistoryPoint>,
     samples: u64,
     /// Grain-steps before the continuum took over, and steps then.
     before: [u64; 2],
@@ -111,62 +42,6 @@ pub struct JoinedInclineRun {
     stage: Stage,
 }
 
-impl JoinedInclineSpec {
-    /// What is joined at the edge.
-    fn overlap(&self) -> OverlapSpec<MuI> {
-        let incline = &self.incline;
-        OverlapSpec {
-            edge: FlatEdge::across(&incline.domain, 2, 0, true, self.height),
-            rheology: self.rheology,
-            far_end: Boundary::FreeSurface,
-            scales: Scales {
-                diameter: incline.diameter,
-                time: (incline.diameter / incline.gravity).sqrt(),
-                density: self.rheology.bulk_density(),
-                stiffness: self.stiffness,
-            },
-            settings: self.settings,
-            strain_rate_floor: 1e-6,
-        }
-    }
-
-    /// Checks what can be checked before anything has flowed.
-    ///
-    /// # Errors
-    /// The first number out of range, by name.
-    pub fn validate(&self) -> Result<(), JoinedInclineError> {
-        self.incline.validate()?;
-        let spec = self.overlap();
-        let settings = spec.settings.resolve(&spec.scales, true)?;
-        self.rheology.validate().map_err(OverlapError::from)?;
-        super::settings::check(
-            "from",
-            self.from,
-            (0.0..=self.incline.relax_time).contains(&self.from),
-            "0 s to the time when averages begin",
-        )?;
-        let least = settings.inner + settings.buffer + settings.cell;
-        super::settings::check(
-            "height",
-            self.height,
-            self.height >= least,
-            "at least a cell over the widths of inner overlap and buffer",
-        )?;
-        Ok(())
-    }
-
-    fn averager(&self) -> Result<Averager<Layers>, JoinedInclineError> {
-        let layer = self.incline.layer;
-        let below = (2.0 * self.incline.diameter / layer).ceil();
-        let layers = Layering {
-            lower: -below * layer,
-            thickness: layer,
-            count: (1.3 * self.height / layer).ceil() as usize + below as usize + 8,
-        };
-        Ok(Averager::new(Layers, layers)?)
-    }
-}
-
 impl JoinedInclineRun {
     /// Sets the bed on its slope.
     ///
@@ -174,7 +49,11 @@ impl JoinedInclineRun {
     /// If a number is out of range or the grains cannot be simulated.
     pub fn new(spec: JoinedInclineSpec) -> Result<Self, JoinedInclineError> {
         spec.validate()?;
-        let alone = InclineRun::new(spec.incline.clone())?;
+        let mut alone = InclineRun::new(spec.incline.clone())?;
+        if let Some(flow) = spec.flow() {
+            let start = |z: f64| Vector3::x() * flow(z);
+            alone.simulation().give_velocity(|g| start(g.position.z));
+        }
         Ok(Self {
             spec,
             stage: Stage::Alone(Box::new(alone)),
@@ -226,9 +105,8 @@ impl JoinedInclineRun {
                     let part = left.min(every - done % every);
                     joined.overlap.advance(&mut joined.simulation, part)?;
                     left -= part;
-                    let measures = joined.simulation.time() > self.spec.incline.relax_time;
-                    if measures && joined.simulation.steps_done().is_multiple_of(every) {
-                        joined.sample();
+                    if joined.simulation.steps_done().is_multiple_of(every) {
+                        joined.sample(joined.simulation.time() > self.spec.incline.relax_time);
                     }
                 }
             }
@@ -244,7 +122,14 @@ impl JoinedInclineRun {
         let mut simulation = run.simulation().clone();
         let steps = simulation.steps_done();
         let before = [steps * simulation.grain_count() as u64, steps];
-        let overlap = Overlap::replace(self.spec.overlap(), &mut simulation)?;
+        let mut spec = self.spec.overlap();
+        let flow = self.spec.flow();
+        if self.spec.mass.is_some() {
+            let grains = simulation.held(|_| true).filter(|g| !g.fixed);
+            spec.edge.position = self.spec.cut(grains.map(|g| (g.position.z, g.mass)));
+        }
+        let velocity = flow.as_ref().map(|flow| flow as &dyn Fn(f64) -> f64);
+        let overlap = Overlap::begin(spec, &mut simulation, velocity)?;
         let joined = Joined::around(simulation, overlap, self.spec.averager()?, before);
         self.stage = Stage::Joined(Box::new(joined));
         Ok(())
@@ -290,25 +175,46 @@ impl Joined {
     ) -> Self {
         Self {
             sums: vec![[0.0; 3]; overlap.continuum().cells()],
+            history: Vec::new(),
             simulation,
             overlap,
             averager,
-            snapshot: Snapshot::default(),
             samples: 0,
             before,
         }
     }
 
-    fn sample(&mut self) {
-        if self.samples == 0 {
-            self.overlap.watch();
+    /// Looks at both, and takes them into the averages where these have begun.
+    fn sample(&mut self, measures: bool) {
+        let (overlap, simulation) = (&mut self.overlap, &mut self.simulation);
+        if measures && self.samples == 0 {
+            overlap.watch();
         }
-        self.simulation.snapshot(&mut self.snapshot);
-        self.averager.sample(&self.snapshot);
-        let continuum = self.overlap.continuum();
+        overlap.sighting.look(simulation);
+        let snapshot = &overlap.sighting.snapshot;
+        let (continuum, area) = (&overlap.continuum, overlap.edge.area);
+        let velocities = continuum.velocities();
+        let (cell, beyond) = (
+            area * continuum.cell_mass(),
+            &velocities[overlap.strip.nodes()..],
+        );
+        let grains = snapshot.grains.iter().filter(|g| !g.fixed);
+        let momentum: f64 = grains.map(|g| g.mass * g.velocity.x).sum();
+        self.history.push(HistoryPoint {
+            time: simulation.time(),
+            mean_velocity: (momentum + cell * beyond.iter().sum::<f64>())
+                / (overlap.grain_mass + cell * beyond.len() as f64),
+            edge_velocity: beyond.first().copied().unwrap_or(0.0),
+            surface_velocity: beyond.last().copied().unwrap_or(0.0),
+            edge_height: overlap.edge.position,
+        });
+        if !measures {
+            return;
+        }
+        self.averager.sample(snapshot);
         for (k, sum) in self.sums.iter_mut().enumerate() {
             let shear = 0.5 * (continuum.shear_stress(k) + continuum.shear_stress(k + 1));
-            let now = [continuum.velocities()[k], continuum.cell_pressure(k), shear];
+            let now = [velocities[k], continuum.cell_pressure(k), shear];
             sum.iter_mut().zip(now).for_each(|(sum, now)| *sum += now);
         }
         self.samples += 1;
@@ -321,6 +227,18 @@ impl Joined {
         self.averager.save("average", &mut record);
         let sums = self.sums.iter().flatten().copied().collect();
         record.numbers.insert("joined.sums".into(), sums);
+        let history = self.history.iter().flat_map(|p| {
+            [
+                p.time,
+                p.mean_velocity,
+                p.edge_velocity,
+                p.surface_velocity,
+                p.edge_height,
+            ]
+        });
+        record
+            .numbers
+            .insert("joined.history".into(), history.collect());
         let [work, steps] = self.before;
         record
             .counts
@@ -350,6 +268,17 @@ impl Joined {
             )));
         }
         joined.sums.copy_from_slice(rows);
+        let history = record.numbers("joined.history").map_err(broken)?;
+        let points = history.as_chunks::<5>().0.iter();
+        joined.history = points
+            .map(|&[time, mean, edge, surface, height]| HistoryPoint {
+                time,
+                mean_velocity: mean,
+                edge_velocity: edge,
+                surface_velocity: surface,
+                edge_height: height,
+            })
+            .collect();
         Ok(joined)
     }
 
@@ -375,20 +304,32 @@ impl Joined {
                 .averager
                 .profile(spec.incline.diameter, spec.incline.grain_density),
             continuum,
+            history: std::mem::take(&mut self.history),
             report: self.overlap.report(),
-            ledger: *self.overlap.ledger(),
+            settings: *self.overlap.settings(),
+            steps_held: [
+                self.overlap.steps_of_loads(),
+                self.overlap.steps_of_an_exchange(),
+            ],
+            ledger: self.overlap.ledger(),
             ledger_errors: self.overlap.ledger_errors(&mut self.simulation),
-            work: self.overlap.work(),
+            work: self.overlap.work(&self.simulation),
             sizes: [grains, cells],
             work_done: [
                 self.before[0] + steps * grains as u64,
                 exchanges * cells as u64,
             ],
             heights: [
+                edge.position + strip.face(0),
+                edge.position + strip.handshake(),
                 edge.position,
                 edge.position + (cells - strip.nodes()) as f64 * strip.cell,
             ],
             state_hash: self.state_hash(),
+            snapshot: {
+                self.overlap.sighting.look(&mut self.simulation);
+                self.overlap.sighting.snapshot
+            },
         }
     }
 
