@@ -213,7 +213,8 @@ fn space(
             }
             end[axis] = corner[axis];
         }
-        if !(space.lower[axis] < space.upper[axis]) {
+        let size = space.upper[axis] - space.lower[axis];
+        if size.is_nan() || size <= 0.0 {
             let range = format!("above the lower corner, {} m", space.lower[axis]);
             return Err(place.refuse("upper", space.upper[axis], range).into());
         }

@@ -123,7 +123,7 @@ impl AverageKeys {
             return Err(place.refuse("species_radii", list, "radii in m that rise"));
         }
         if let (Some(lower), Some(upper)) = (self.lower, self.upper)
-            && (0..3).any(|k| !(lower[k] < upper[k]))
+            && (0..3).any(|k| lower[k] >= upper[k])
         {
             let text = format!("{upper:?}");
             return Err(place.refuse("upper", text, format!("above `lower`, {lower:?}")));
