@@ -250,6 +250,28 @@ impl InclineRun {
         self.simulation.state_hash()
     }
 
+    /// Starts anew with the velocities of a layer of this depth (m) and mass (kg): a grain has the velocity of the place below
+    /// which as much mass lies. A settled bed is denser than the flow that comes of it, and Bagnold's profile of its own
+    /// height is that of a shallower one. Nothing happens where the start is from rest.
+    pub fn start_as_layer(&mut self, depth: f64, mass: f64) {
+        let Some(flow) = self.spec.starting_flow(depth) else {
+            return;
+        };
+        self.simulation.snapshot(&mut self.snapshot);
+        let mut grains: Vec<_> = self.snapshot.grains.iter().filter(|g| !g.fixed).collect();
+        grains.sort_by(|a, b| a.position.z.total_cmp(&b.position.z).then(a.id.cmp(&b.id)));
+        let last = grains.iter().map(|g| g.id as usize + 1).max().unwrap_or(0);
+        let mut velocities = vec![0.0; last];
+        let mut below = 0.0;
+        for grain in grains {
+            velocities[grain.id as usize] = flow((below + 0.5 * grain.mass) / mass * depth);
+            below += grain.mass;
+        }
+        let of = |id: u32| velocities.get(id as usize).copied().unwrap_or(0.0);
+        self.simulation
+            .give_velocity(|grain| Vector3::x() * of(grain.id));
+    }
+
     /// The simulation, for output of grains.
     pub fn simulation(&mut self) -> &mut Simulation {
         &mut self.simulation

@@ -138,6 +138,7 @@ fn compare(depth: f64, seed: u64) -> Outcome<String> {
     let mut clock = processor_time().ok_or("no processor time on this system")?;
     let (spec, full_settling) = flow(all, seed)?;
     let mut full = InclineRun::new(spec)?;
+    full.start_as_layer(depth, all as f64 * MEAN_MASS);
     let settling = spent(&mut clock)?;
     let (incline, joined_settling) = flow(lower.min(all), seed)?;
     let mut joined = JoinedInclineRun::new(JoinedInclineSpec {

@@ -202,6 +202,14 @@ pub(super) fn run(scene: &InclineScene, under: &mut Under) -> Result<Findings, F
     .map_err(failure)?;
     if under.resumed.is_some() {
         under.begin()?;
+    } else if let Some(rheology) = &scene.rheology {
+        // As the other models of this scene begin.
+        let free = bed.grains.iter().filter(|g| !g.fixed);
+        let mass = free
+            .map(|g| 4.0 / 3.0 * std::f64::consts::PI * g.radius.powi(3))
+            .sum::<f64>()
+            * scene.grains.density;
+        run.start_as_layer(scene.continuum_depth(rheology), mass);
     }
     let bar = Bar::new(&format!(
         "{} at {} degrees",

@@ -15,7 +15,6 @@ use crate::coarse_graining::{Averager, Layers};
 use crate::incline::InclineRun;
 use colluvium_continuum::rheology::MuI;
 use colluvium_dem::{Record, Simulation, StateHash};
-use nalgebra::Vector3;
 
 enum Stage {
     /// Grains alone.
@@ -50,10 +49,8 @@ impl JoinedInclineRun {
     pub fn new(spec: JoinedInclineSpec) -> Result<Self, JoinedInclineError> {
         spec.validate()?;
         let mut alone = InclineRun::new(spec.incline.clone())?;
-        if let Some(flow) = spec.flow() {
-            let start = |z: f64| Vector3::x() * flow(z);
-            alone.simulation().give_velocity(|g| start(g.position.z));
-        }
+        let mass = spec.total_mass();
+        alone.start_as_layer(spec.depth_of(mass), mass);
         Ok(Self {
             spec,
             stage: Stage::Alone(Box::new(alone)),
@@ -128,6 +125,9 @@ impl JoinedInclineRun {
             let grains = simulation.held(|_| true).filter(|g| !g.fixed);
             spec.edge.position = self.spec.cut(grains.map(|g| (g.position.z, g.mass)));
         }
+        // The bed is denser than the flow that comes of it: below the edge lies as much mass as below `height`.
+        let lift = self.spec.height - spec.edge.position;
+        let flow = flow.map(|flow| move |z: f64| flow(z + lift));
         let velocity = flow.as_ref().map(|flow| flow as &dyn Fn(f64) -> f64);
         let overlap = Overlap::begin(spec, &mut simulation, velocity)?;
         let joined = Joined::around(simulation, overlap, self.spec.averager()?, before);

@@ -110,13 +110,10 @@ impl JoinedInclineSpec {
             mass >= least,
             "that of the material below the edge and at least a cell above it",
         )?;
-        let free = self.incline.bed.iter().filter(|g| !g.fixed);
-        let volume: f64 = free.map(|g| 4.0 / 3.0 * PI * g.radius.powi(3)).sum();
-        let bed = volume * self.incline.grain_density;
         check(
             "height",
             self.height,
-            bed >= self.lower_mass(),
+            self.bed_mass() >= self.lower_mass(),
             "at most what the grains of the bed reach to",
         )?;
         Ok(())
@@ -132,16 +129,27 @@ impl JoinedInclineSpec {
         self.height * self.area() * self.rheology.bulk_density()
     }
 
-    /// Bagnold's profile that grains and continuum start with, where the bed is only the lower part and flows from
-    /// the start: velocity (m/s) over height (m).
+    /// Bagnold's profile that the continuum starts with, where the bed is only the lower part and flows from the start:
+    /// velocity (m/s) over height (m).
     pub(super) fn flow(&self) -> Option<impl Fn(f64) -> f64 + use<>> {
-        self.incline.starting_flow(self.depth()?)
+        self.incline.starting_flow(self.depth_of(self.mass?))
     }
 
-    /// Depth of all material at the continuum's density (m), where the bed is only its lower part.
-    fn depth(&self) -> Option<f64> {
-        let mass = self.mass?;
-        Some(mass / (self.area() * self.rheology.bulk_density()))
+    /// Mass of all material (kg).
+    pub(super) fn total_mass(&self) -> f64 {
+        self.mass.unwrap_or_else(|| self.bed_mass())
+    }
+
+    /// Mass of the free grains of the bed (kg).
+    fn bed_mass(&self) -> f64 {
+        let free = self.incline.bed.iter().filter(|g| !g.fixed);
+        let volume: f64 = free.map(|g| 4.0 / 3.0 * PI * g.radius.powi(3)).sum();
+        volume * self.incline.grain_density
+    }
+
+    /// Depth of so much material (kg) at the continuum's density (m).
+    pub(super) fn depth_of(&self, mass: f64) -> f64 {
+        mass / (self.area() * self.rheology.bulk_density())
     }
 
     /// Height over which a bed that is only the lower part has the mass that belongs below the edge (m).
