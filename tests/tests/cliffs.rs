@@ -28,7 +28,7 @@ fn cliff(folder: &Path, name: &str, sets: &[&str]) -> impl Fn(&str) -> f64 + use
         quantity.and_then(|q| q.value).unwrap_or(f64::NAN)
     };
     println!(
-        "{name}: stood {}, failure {:.0} s, impact {:.0} s, rest {:.0} s; pile {:.1} m, run-out {:.1} m, repose {:.1}°; \
+        "{name}: stood {}, failure {:.0} s, impact {:.0} s, rest {:.0} s; pile {:.1} m, run-out {:.1} m, repose {:.1}°, wedge {:.1}°; \
          debris {:.2}, contacts held {:.2}, bonds {:.2}, turned {:.0}°",
         found("stood"),
         found("time_of_failure"),
@@ -37,6 +37,7 @@ fn cliff(folder: &Path, name: &str, sets: &[&str]) -> impl Fn(&str) -> f64 + use
         found("pile_height"),
         found("runout"),
         found("repose"),
+        found("debris_slope"),
         found("debris_share"),
         found("held_contact_share"),
         found("bond_survival"),

@@ -511,7 +511,7 @@ impl Recipe for CliffScene {
     }
 
     fn compared(&self) -> Vec<&'static str> {
-        vec!["runout", "pile_height", "repose"]
+        vec!["x_front", "pile_height", "debris_slope"]
     }
 }
 
@@ -606,9 +606,9 @@ impl CliffScene {
         let source =
             "atan(pile's height over run-out from its top); 20 to 30 on 67P (Vincent et al. 2016)";
         summary.put("repose", self.reference(3, repose, source));
-        let slope = degrees(of(&|p| p.slope_degrees));
-        let source = "of the straight line through the pile from its top to its end";
-        summary.put("slope", slope.from(source));
+        let wedge = degrees(of(&Pile::wedge_degrees));
+        let source = "of the wedge from the foot with the debris' area and length: atan(2 A/L²)";
+        summary.put("debris_slope", wedge.from(source));
     }
 
     fn put_boulders(&self, ran: &mut Ran, sizes: &Table, summary: &mut Summary) {

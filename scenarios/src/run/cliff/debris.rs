@@ -13,8 +13,10 @@ pub struct Pile {
     pub height: f64,
     /// Where it ends (m).
     pub end: f64,
-    /// Slope of the straight line through it from there to its end (degrees).
-    pub slope_degrees: f64,
+    /// Its area in section (m²).
+    pub area: f64,
+    /// Its length from the foot of the cliff (m).
+    pub length: f64,
 }
 
 impl Pile {
@@ -27,25 +29,26 @@ impl Pile {
         let top =
             (first..=last).max_by(|&a, &b| heights[a].total_cmp(&heights[b]).then(b.cmp(&a)))?;
         let end = super::super::heap::edge(places, heights, threshold);
-        let n = (last - top + 1) as f64;
-        let mean = |of: &[f64]| of[top..=last].iter().sum::<f64>() / n;
-        let (x, h) = (mean(places), mean(heights));
-        let (mut up, mut along) = (0.0, 0.0);
-        for i in top..=last {
-            up += (places[i] - x) * (heights[i] - h);
-            along += (places[i] - x).powi(2);
-        }
+        let spacing = places.get(1).map_or(0.0, |next| next - places[0]);
+        let area: f64 = heights[first..=last].iter().sum::<f64>() * spacing;
         Some(Pile {
             top: places[top],
             height: heights[top],
             end,
-            slope_degrees: (-up / along).atan().to_degrees(),
+            area,
+            length: end - foot,
         })
     }
 
     /// Mean angle of repose (degrees): height over run-out, both from its top (Kappel et al. 2020, §4.2).
     pub fn repose_degrees(&self) -> f64 {
         (self.height / (self.end - self.top)).atan().to_degrees()
+    }
+
+    /// Slope of the wedge of its area and its length: `tan = 2 A/L²` (degrees). Other than the angle from the
+    /// top it does not hang on where a pile of blocks is highest.
+    pub fn wedge_degrees(&self) -> f64 {
+        (2.0 * self.area / self.length.powi(2)).atan().to_degrees()
     }
 }
 
@@ -122,7 +125,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_pile_has_its_top_its_end_and_its_slope() {
+    fn a_pile_has_its_top_its_end_and_its_slopes() {
         let places: Vec<f64> = (0..60).map(|k| f64::from(k) - 9.5).collect();
         // A cliff behind the foot, a pile that is highest at 5.5 m and falls by 0.4 a metre.
         let height = |x: f64| match x {
@@ -134,8 +137,19 @@ mod tests {
         let pile = Pile::of(&places, &heights, 0.0, 0.2).unwrap();
         assert_eq!((pile.top, pile.height), (5.5, 10.0));
         assert!((pile.end - 30.0).abs() < 1e-9, "{}", pile.end);
-        assert!((pile.slope_degrees - 0.4f64.atan().to_degrees()).abs() < 1e-9);
         assert!((pile.repose_degrees() - (10.0f64 / 24.5).atan().to_degrees()).abs() < 1e-9);
+        let exact: f64 = heights
+            .iter()
+            .zip(&places)
+            .filter(|(_, x)| **x > 0.0)
+            .map(|(h, _)| h)
+            .sum();
+        let wedge = (2.0 * exact / 30.0f64.powi(2)).atan().to_degrees();
+        assert!(
+            (pile.wedge_degrees() - wedge).abs() < 0.1,
+            "{}",
+            pile.wedge_degrees()
+        );
         assert_eq!(Pile::of(&places, &[0.0; 60], 0.0, 0.2), None);
     }
 
