@@ -106,8 +106,6 @@ pub(crate) struct Ground {
     pub parts: Vec<(usize, usize)>,
     /// ∫ n dA of the ground's surface in each cell, out of the ground.
     pub wall: Vec<[f64; DIMENSIONS]>,
-    /// Cells that ground cuts, from low to high.
-    pub cut: Vec<usize>,
 }
 
 /// Halves of the faces and of the lines through the middles of cells that are free.
@@ -267,9 +265,6 @@ impl Ground {
         let mut ground = Self {
             contact: terrain.contact,
             solid: free.iter().map(|free| 1.0 - free).collect(),
-            cut: (0..count)
-                .filter(|&cell| free[cell] > 0.0 && free[cell] < 1.0)
-                .collect(),
             planes: vec![None; count],
             quarters: halves.quarters.clone(),
             aperture: Default::default(),

@@ -4,7 +4,7 @@
 //! a face is the share of matter in the free part of what lies behind it. A full cell therefore passes
 //! on exactly its face's flux. Cells with a small free part may receive more than they hold, or give more
 //! than they have: the rest moves on to cells beside and above them, so that volume is kept and no cell
-//! that ground cuts stays overfull.
+//! stays overfull.
 
 use super::Ground;
 use crate::free_surface::fraction::volume_in;
@@ -12,8 +12,12 @@ use crate::free_surface::plane::Plane;
 use crate::free_surface::topology::{NONE, Topology};
 use crate::grid::DIMENSIONS;
 
-/// More than a cell holds, or less than nothing, by this much is round-off.
+/// Parts of a slab below this are round-off.
 const ROUND_OFF: f64 = 1e-13;
+/// More than a cell holds, or less than nothing, by this much is left to the residual of the divergence.
+const EXCESS: f64 = 1e-10;
+/// Most cells through which what does not fit is handed on.
+const LONGEST_WAY: usize = 256;
 /// Times that excess is looked for.
 const ROUNDS: usize = 4;
 
@@ -47,17 +51,16 @@ impl Ground {
     pub(crate) fn settle(&self, topology: &Topology, fractions: &mut [f64]) {
         for _ in 0..ROUNDS {
             let mut moved = false;
-            for &cell in &self.cut {
+            for cell in 0..fractions.len() {
                 moved |= self.fill_up(topology, fractions, cell);
                 let mut at = cell;
                 // What has no room beside it lifts the column above.
-                while self.push_out(topology, fractions, at) {
-                    moved = true;
-                    let above = topology.cell_neighbours[at][DIMENSIONS - 1][1];
-                    if above == NONE || fractions[above] <= self.free[above] + ROUND_OFF {
+                for _ in 0..LONGEST_WAY {
+                    let Some(next) = self.push_out(topology, fractions, at) else {
                         break;
-                    }
-                    at = above;
+                    };
+                    moved = true;
+                    at = next;
                 }
             }
             if !moved {
@@ -80,11 +83,12 @@ impl Ground {
     }
 
     /// Gives what a cell holds too much to its neighbours, as much as they have room for, and the rest
-    /// to the one above. Says whether there was any.
-    fn push_out(&self, topology: &Topology, fractions: &mut [f64], cell: usize) -> bool {
+    /// to the one above, or where that is shut off to the one with the widest way to it. Says which one may
+    /// hold too much now.
+    fn push_out(&self, topology: &Topology, fractions: &mut [f64], cell: usize) -> Option<usize> {
         let mut excess = fractions[cell] - self.free[cell];
-        if excess <= ROUND_OFF {
-            return false;
+        if excess <= EXCESS {
+            return None;
         }
         let beside = self.beside(topology, cell);
         for next in beside.into_iter().filter(|&next| next != NONE) {
@@ -93,17 +97,28 @@ impl Ground {
             fractions[cell] -= part;
             excess -= part;
         }
-        let above = beside[2 * DIMENSIONS - 1];
-        if excess > ROUND_OFF && above != NONE {
-            fractions[above] += excess;
-            fractions[cell] -= excess;
+        let mut next = beside[2 * DIMENSIONS - 1];
+        if next == NONE {
+            let mut widest = 0.0;
+            for (n, &other) in beside.iter().enumerate() {
+                let face = topology.cell_faces[cell][n / 2][n % 2];
+                if other != NONE && self.aperture[n / 2][face] > widest {
+                    widest = self.aperture[n / 2][face];
+                    next = other;
+                }
+            }
         }
-        true
+        if excess <= EXCESS || next == NONE {
+            return None;
+        }
+        fractions[next] += excess;
+        fractions[cell] -= excess;
+        Some(next)
     }
 
     /// Takes what a cell has less than nothing from its neighbours. Says whether there was any.
     fn fill_up(&self, topology: &Topology, fractions: &mut [f64], cell: usize) -> bool {
-        if fractions[cell] >= -ROUND_OFF {
+        if fractions[cell] >= -EXCESS {
             return false;
         }
         for next in self.beside(topology, cell) {
