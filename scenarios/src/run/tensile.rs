@@ -12,6 +12,7 @@ mod sample;
 
 use super::comet;
 use super::world::fragments;
+use super::world::workshop::INTERRUPTED;
 use super::world::{Course, Expected, Ran, Recipe, Workshop, World};
 use crate::failure::Failure;
 use crate::scene::world::{Materials, OutputKeys, Place, StepKeys};
@@ -28,6 +29,8 @@ use std::f64::consts::PI;
 const SEATING: f64 = 0.01;
 /// Damping of the seating, over √(g/d).
 const SEATING_DAMPING: f64 = 10.0;
+/// Longest time of it, in √(d/g): so damped, a grain falls two diameters in it.
+const SEATING_PATIENCE: f64 = 20.0;
 
 /// Strengths of 1–2 mm grains (Pa): Kappel et al. (2020, §4.3) give them for 10–20 mm and 0.2–0.4 mm, scaled
 /// by 1/R; means of the two.
@@ -383,9 +386,16 @@ impl TensileScene {
                         kinetic: 1e-8,
                         unbalanced: 1e9,
                     },
+                    patience: SEATING_PATIENCE,
                     ..Relaxation::under(g)
                 };
-                shop.relax(&around, &seating)?;
+                shop.relax(&around, &seating).map_err(|failure| match failure {
+                    Failure::Run(why) if why != INTERRUPTED => Failure::Run(format!(
+                        "the sample does not come to rest in a cone that is a wall (key `clamp.kind`) under a weight of {weight:.2e} \
+                         Pa, {SEATING} of its strength by Rumpf: it slides through or comes apart; \"gripped\" holds it: {why}"
+                    )),
+                    other => other,
+                })?;
             }
         }
         let acceleration = relaxation.acceleration;
