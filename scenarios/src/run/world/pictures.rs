@@ -1,7 +1,7 @@
 //! Pictures of grains and bodies in the run directory, `view_*.png`: balls and triangles in a parallel
 //! projection.
 
-pub mod canvas;
+pub(crate) mod canvas;
 mod facets;
 
 use super::recipe::Recipe;

@@ -8,6 +8,7 @@ const MARGIN: f64 = 0.04;
 /// What lies behind, and within a plane that is seen from its side.
 const PAPER: [u8; 3] = [0xff, 0xff, 0xff];
 const GROUND: [u8; 3] = [0xe4, 0xdf, 0xd4];
+
 /// A ball to be drawn: place in the picture (m), depth (m), radius (m), colour.
 pub struct Ball {
     pub at: [f64; 2],
