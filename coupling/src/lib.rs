@@ -7,3 +7,4 @@ pub mod coarse_graining;
 pub mod incline;
 pub mod overlap;
 pub mod steady_state;
+pub mod zones;

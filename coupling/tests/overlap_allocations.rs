@@ -9,33 +9,17 @@ use colluvium_coupling::overlap::{
 };
 use colluvium_dem::*;
 use nalgebra::Vector3;
-use std::alloc::{GlobalAlloc, Layout, System};
-use std::sync::atomic::{AtomicU64, Ordering};
-
-struct Counting;
-
-static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-
-// SAFETY: hands everything on to the system's allocator; counting has no effect on memory.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller keeps the contract of `alloc`.
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller keeps the contract of `realloc`.
-        unsafe { System.realloc(at, layout, size) }
-    }
-    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
-        // SAFETY: the caller keeps the contract of `dealloc`.
-        unsafe { System.dealloc(at, layout) }
-    }
-}
+use stats_alloc::{INSTRUMENTED_SYSTEM, StatsAlloc};
+use std::alloc::System;
 
 #[global_allocator]
-static COUNTING: Counting = Counting;
+static COUNTING: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
+
+/// Allocations of all threads since the start.
+fn allocations() -> u64 {
+    let counts = COUNTING.stats();
+    (counts.allocations + counts.reallocations) as u64
+}
 
 #[test]
 fn steps_between_exchanges_allocate_nothing() {
@@ -95,9 +79,9 @@ fn steps_between_exchanges_allocate_nothing() {
     let mut counts = Vec::new();
     for _ in 0..100 {
         assert!(overlap.at_exchange());
-        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        let before = allocations();
         overlap.advance(&mut simulation, 19).unwrap();
-        counts.push(ALLOCATIONS.load(Ordering::Relaxed) - before);
+        counts.push(allocations() - before);
         overlap.advance(&mut simulation, 1).unwrap();
     }
     // The grains' lists may have to grow where they are made anew.

@@ -6,35 +6,19 @@ use colluvium_dem::preparation::{Bed, InclineBed, RadiusLaw, settle_incline_bed}
 use colluvium_dem::walls::{Mesh, Sine};
 use colluvium_dem::*;
 use nalgebra::Vector3;
-use std::alloc::{GlobalAlloc, Layout, System};
+use stats_alloc::{INSTRUMENTED_SYSTEM, StatsAlloc};
+use std::alloc::System;
 use std::ops::ControlFlow;
 use std::sync::Arc;
-use std::sync::atomic::{AtomicU64, Ordering};
-
-struct Counting;
-
-static ALLOCATIONS: AtomicU64 = AtomicU64::new(0);
-
-// SAFETY: hands everything on to the system's allocator; counting has no effect on memory.
-unsafe impl GlobalAlloc for Counting {
-    unsafe fn alloc(&self, layout: Layout) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller keeps the contract of `alloc`.
-        unsafe { System.alloc(layout) }
-    }
-    unsafe fn realloc(&self, at: *mut u8, layout: Layout, size: usize) -> *mut u8 {
-        ALLOCATIONS.fetch_add(1, Ordering::Relaxed);
-        // SAFETY: the caller keeps the contract of `realloc`.
-        unsafe { System.realloc(at, layout, size) }
-    }
-    unsafe fn dealloc(&self, at: *mut u8, layout: Layout) {
-        // SAFETY: the caller keeps the contract of `dealloc`.
-        unsafe { System.dealloc(at, layout) }
-    }
-}
 
 #[global_allocator]
-static COUNTING: Counting = Counting;
+static COUNTING: &StatsAlloc<System> = &INSTRUMENTED_SYSTEM;
+
+/// Allocations of all threads since the start.
+fn allocations() -> u64 {
+    let counts = COUNTING.stats();
+    (counts.allocations + counts.reallocations) as u64
+}
 
 fn flow(threads: Threads, floor: impl Fn(f64) -> Wall) -> Simulation {
     let law = ContactLaw::linear(
@@ -109,13 +93,13 @@ fn count(s: &mut Simulation) -> (u64, u64, u64) {
     let mut quiet = u64::MAX;
     // The list of pairs within reach is renewed every few steps: look at single ones.
     for _ in 0..50 {
-        let before = ALLOCATIONS.load(Ordering::Relaxed);
+        let before = allocations();
         s.advance(1).unwrap();
-        quiet = quiet.min(ALLOCATIONS.load(Ordering::Relaxed) - before);
+        quiet = quiet.min(allocations() - before);
     }
-    let (before, builds) = (ALLOCATIONS.load(Ordering::Relaxed), s.list_builds());
+    let (before, builds) = (allocations(), s.list_builds());
     s.advance(1500).unwrap();
-    let after = ALLOCATIONS.load(Ordering::Relaxed);
+    let after = allocations();
     (quiet, after - before, s.list_builds() - builds)
 }
 

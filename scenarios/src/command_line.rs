@@ -7,6 +7,7 @@ use crate::failure::Failure;
 use crate::grain_files::Unsaid;
 use crate::pareto;
 use crate::plan;
+use crate::render;
 use crate::report;
 use crate::run::{self, Ended, RunOptions};
 use crate::scene::{self, Scene};
@@ -104,6 +105,21 @@ enum Command {
         /// The file; default: report.html in the directory, or here for several directories
         #[arg(long, value_name = "FILE")]
         out: Option<PathBuf>,
+    },
+    /// Draw the series of a run as PNG pictures and as an animation, which its report then shows
+    Render {
+        /// Run directory with grains.vtkhdf or fields.vtkhdf
+        #[arg(value_name = "DIR")]
+        directory: PathBuf,
+        /// The axis that is looked along
+        #[arg(long, value_name = "AXIS", value_parser = ["x", "y", "z"], default_value = "y")]
+        view: String,
+        /// Colour by speed, or by what hangs together
+        #[arg(long, value_name = "WHAT", value_parser = ["speed", "cluster"], default_value = "speed")]
+        colour: String,
+        /// Pictures a second
+        #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=50))]
+        per_second: u16,
     },
     /// Print the JSON Schema of scene files
     Schema,
@@ -395,6 +411,27 @@ pub fn execute(line: CommandLine) -> Result<(), Failure> {
         Command::Report { directories, out } => {
             let path = report::write_for(&directories, out.as_deref())?;
             print(&path.display().to_string());
+        }
+        Command::Render {
+            directory,
+            view,
+            colour,
+            per_second,
+        } => {
+            let request = render::Request {
+                view: match view.as_str() {
+                    "x" => render::View::X,
+                    "z" => render::View::Z,
+                    _ => render::View::Y,
+                },
+                colour: match colour.as_str() {
+                    "cluster" => render::Colour::Cluster,
+                    _ => render::Colour::Speed,
+                },
+                per_second,
+            };
+            let rendered = render::render(&directory, &request)?;
+            print(&rendered.display().to_string());
         }
         Command::Schema => {
             let text = serde_json::to_string_pretty(&scene::json_schema())

@@ -22,6 +22,7 @@ pub mod mesh_files;
 pub mod pareto;
 pub mod plan;
 pub mod progress;
+pub mod render;
 pub mod report;
 pub mod results_file;
 pub mod rheology_file;

@@ -27,9 +27,12 @@ pub const CHECKPOINT_BEFORE: &str = "checkpoint_before.h5";
 pub const PACKING: &str = "packing.h5";
 /// Name of the log.
 pub const LOG: &str = "log.txt";
+/// The run in motion.
+pub const ANIMATION: &str = "animation.gif";
 
 /// Every file that a run, a campaign or a comparison writes.
-const OWN_FILES: [&str; 25] = [
+const OWN_FILES: [&str; 26] = [
+    ANIMATION,
     SCENE,
     REPORT,
     RESULTS,
@@ -239,7 +242,8 @@ impl RunDirectory {
     }
 }
 
-fn summary_text(summary: &Summary) -> Result<String, Failure> {
+/// The text of `summary.json`.
+pub fn summary_text(summary: &Summary) -> Result<String, Failure> {
     let text = serde_json::to_string_pretty(summary)
         .map_err(|error| Failure::Run(format!("summary: {error}")))?;
     Ok(format!("{text}\n"))
@@ -323,6 +327,7 @@ fn remove_old_run(path: &Path) -> std::io::Result<()> {
             _ => {}
         }
     }
+    crate::render::remove(path)?;
     crate::frames::remove(path)
 }
 

@@ -88,6 +88,35 @@ impl Cells {
 }
 
 impl Frame {
+    fn field(&self, name: &str) -> Result<&Field, String> {
+        let found = self.fields.iter().find(|f| f.name == name);
+        found.ok_or_else(|| format!("no field `{name}`: written by an older version?"))
+    }
+
+    /// A field of real numbers.
+    pub fn scalars(&self, name: &str) -> Result<&[f64], String> {
+        match &self.field(name)?.values {
+            Values::Scalars(values) => Ok(values),
+            _ => Err(format!("the field `{name}` is not of real numbers")),
+        }
+    }
+
+    /// A field of vectors.
+    pub fn vectors(&self, name: &str) -> Result<&[[f64; 3]], String> {
+        match &self.field(name)?.values {
+            Values::Vectors(values) => Ok(values),
+            _ => Err(format!("the field `{name}` is not of vectors")),
+        }
+    }
+
+    /// A field of whole numbers.
+    pub fn counts(&self, name: &str) -> Result<&[i64], String> {
+        match &self.field(name)?.values {
+            Values::Counts(values) => Ok(values),
+            _ => Err(format!("the field `{name}` is not of whole numbers")),
+        }
+    }
+
     fn cell_count(&self) -> usize {
         self.points.len() / self.cells.points_each()
     }

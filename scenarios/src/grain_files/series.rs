@@ -1,7 +1,7 @@
 //! Series of this program: `grains.vtkhdf`, with `contacts.vtkhdf` beside it.
 
 use super::{Instant, Link, Row};
-use crate::vtkhdf::{self, Field, Frame, Values};
+use crate::vtkhdf::{self, Frame};
 use nalgebra::Vector3;
 use std::path::Path;
 
@@ -33,36 +33,10 @@ pub(super) fn read(path: &Path) -> Result<Vec<Instant>, String> {
     Ok(instants)
 }
 
-fn field<'a>(frame: &'a Frame, name: &str) -> Result<&'a Field, String> {
-    let found = frame.fields.iter().find(|f| f.name == name);
-    found.ok_or_else(|| format!("no field `{name}`: written by an older version?"))
-}
-
-fn scalars<'a>(frame: &'a Frame, name: &str) -> Result<&'a [f64], String> {
-    match &field(frame, name)?.values {
-        Values::Scalars(values) => Ok(values),
-        _ => Err(format!("the field `{name}` is not of real numbers")),
-    }
-}
-
-fn vectors<'a>(frame: &'a Frame, name: &str) -> Result<&'a [[f64; 3]], String> {
-    match &field(frame, name)?.values {
-        Values::Vectors(values) => Ok(values),
-        _ => Err(format!("the field `{name}` is not of vectors")),
-    }
-}
-
-fn counts<'a>(frame: &'a Frame, name: &str) -> Result<&'a [i64], String> {
-    match &field(frame, name)?.values {
-        Values::Counts(values) => Ok(values),
-        _ => Err(format!("the field `{name}` is not of whole numbers")),
-    }
-}
-
 fn rows(frame: &Frame) -> Result<Vec<Row>, String> {
-    let (id, fixed) = (counts(frame, "id")?, counts(frame, "fixed")?);
-    let (radius, mass) = (scalars(frame, "radius")?, scalars(frame, "mass")?);
-    let (velocity, spin) = (vectors(frame, "velocity")?, vectors(frame, "spin")?);
+    let (id, fixed) = (frame.counts("id")?, frame.counts("fixed")?);
+    let (radius, mass) = (frame.scalars("radius")?, frame.scalars("mass")?);
+    let (velocity, spin) = (frame.vectors("velocity")?, frame.vectors("spin")?);
     Ok((0..frame.points.len())
         .map(|k| Row {
             id: id[k],
@@ -82,10 +56,10 @@ fn rows(frame: &Frame) -> Result<Vec<Row>, String> {
 const BOND: i64 = 2;
 
 fn links(frame: &Frame) -> Result<Vec<Link>, String> {
-    let (first, second) = (counts(frame, "first")?, counts(frame, "second")?);
-    let (force, point) = (vectors(frame, "force")?, vectors(frame, "arm")?);
-    let (torque, other) = (vectors(frame, "torque")?, vectors(frame, "other_torque")?);
-    let kind = counts(frame, "kind")?;
+    let (first, second) = (frame.counts("first")?, frame.counts("second")?);
+    let (force, point) = (frame.vectors("force")?, frame.vectors("arm")?);
+    let (torque, other) = (frame.vectors("torque")?, frame.vectors("other_torque")?);
+    let kind = frame.counts("kind")?;
     Ok((0..first.len())
         .map(|k| Link {
             ids: [first[k], second[k]],

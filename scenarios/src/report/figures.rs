@@ -54,9 +54,10 @@ fn draw(record: &Record, of: &Figure) -> Markup {
                 return html! {};
             };
             let data = base64::engine::general_purpose::STANDARD.encode(bytes);
+            let kind = if file.ends_with(".gif") { "gif" } else { "png" };
             html! {
                 figure {
-                    img style="max-width:100%" alt=(caption) src=(format!("data:image/png;base64,{data}"));
+                    img style="max-width:100%" alt=(caption) src=(format!("data:image/{kind};base64,{data}"));
                     figcaption { (caption) }
                 }
             }

@@ -12,6 +12,7 @@ use crate::cost::Cost;
 use crate::failure::Failure;
 use crate::frames::Frames;
 use crate::progress::Bar;
+use crate::render::render_own;
 use crate::run::{Findings, Under, bed, grain_table, step};
 use crate::run_directory;
 use crate::scene::Scene;
@@ -211,6 +212,8 @@ pub fn run(recipe: &dyn Recipe, under: &mut Under) -> Result<Findings, Failure> 
         None => Vec::new(),
     };
     let mut found = findings(recipe, (&stored, &mut ran), &pictures, under)?;
+    let frames = recipe.output().frames as usize;
+    render_own(under.directory.path(), frames, &mut found.summary)?;
     found.tables.extend(fields);
     Ok(found)
 }

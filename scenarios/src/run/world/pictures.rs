@@ -1,7 +1,7 @@
 //! Pictures of grains and bodies in the run directory, `view_*.png`: balls and triangles in a parallel
 //! projection.
 
-mod canvas;
+pub(crate) mod canvas;
 mod facets;
 
 use super::recipe::Recipe;
@@ -14,7 +14,7 @@ use colluvium_dem::{Body, Shape, Simulation};
 use nalgebra::Vector3;
 
 /// Colours of kinds and clusters, apart for the colour-blind (after Okabe & Ito).
-const PALETTE: [[u8; 3]; 8] = [
+pub const PALETTE: [[u8; 3]; 8] = [
     [0x4b, 0xa5, 0xd8],
     [0xd9, 0x5f, 0x1e],
     [0x12, 0x96, 0x6f],
@@ -25,7 +25,7 @@ const PALETTE: [[u8; 3]; 8] = [
     [0x60, 0x60, 0x80],
 ];
 /// Colour of grains without a cluster, and of fixed ones.
-const PLAIN: [u8; 3] = [0xb4, 0xb4, 0xb4];
+pub const PLAIN: [u8; 3] = [0xb4, 0xb4, 0xb4];
 /// Colour of bodies.
 const BODY: [u8; 3] = [0xe8, 0xe6, 0xe0];
 /// Colours of rising speed (after viridis).
@@ -250,14 +250,15 @@ const NAMES: [&str; 8] = [
 ];
 
 /// A speed that all but one grain in fifty stay below (m/s).
-fn fastest(speeds: impl Iterator<Item = f64>) -> f64 {
+pub fn fastest(speeds: impl Iterator<Item = f64>) -> f64 {
     let mut speeds: Vec<f64> = speeds.collect();
     speeds.sort_by(f64::total_cmp);
     let at = (speeds.len() * 49 / 50).min(speeds.len().saturating_sub(1));
     speeds.get(at).copied().unwrap_or(0.0)
 }
 
-fn speed_colour(share: f64) -> [u8; 3] {
+/// Colour of a share of the fastest speed.
+pub fn speed_colour(share: f64) -> [u8; 3] {
     let at = share.clamp(0.0, 1.0) * (SPEEDS.len() - 1) as f64;
     let low = (at as usize).min(SPEEDS.len() - 2);
     let part = at - low as f64;
@@ -267,7 +268,8 @@ fn speed_colour(share: f64) -> [u8; 3] {
 /// Keyword of the caption in a file.
 const CAPTION: &str = "Description";
 
-fn encode(
+/// A PNG with a caption in it.
+pub fn encode(
     pixels: &[u8],
     [width, height]: [usize; 2],
     caption: &str,

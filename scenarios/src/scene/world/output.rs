@@ -11,7 +11,8 @@ pub struct OutputKeys {
     /// Rows of `history.csv` over the planned length of the run.
     #[schemars(extend("minimum" = 1, "maximum" = 1000000))]
     pub rows: u64,
-    /// Instants in `grains.vtkhdf` and `contacts.vtkhdf` besides the start, for ParaView; 0 writes none.
+    /// Instants in `grains.vtkhdf` and `contacts.vtkhdf` besides the start, for ParaView; 0 writes none,
+    /// from 10 on an animation of them stands in the report.
     #[schemars(extend("minimum" = 0, "maximum" = 100000))]
     pub frames: u64,
     /// Pictures in the report besides those of start and end.

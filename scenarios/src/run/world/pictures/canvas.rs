@@ -8,6 +8,7 @@ const MARGIN: f64 = 0.04;
 /// What lies behind, and within a plane that is seen from its side.
 const PAPER: [u8; 3] = [0xff, 0xff, 0xff];
 const GROUND: [u8; 3] = [0xe4, 0xdf, 0xd4];
+
 /// A ball to be drawn: place in the picture (m), depth (m), radius (m), colour.
 pub struct Ball {
     pub at: [f64; 2],
@@ -20,6 +21,38 @@ pub struct Ball {
 pub struct Plate {
     pub corners: [[f64; 3]; 3],
     pub colour: [u8; 3],
+}
+
+/// What a picture reaches over (m).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Extent {
+    low: [f64; 2],
+    high: [f64; 2],
+}
+
+impl Extent {
+    /// Around nothing.
+    pub const NOTHING: Extent = Extent {
+        low: [f64::INFINITY; 2],
+        high: [f64::NEG_INFINITY; 2],
+    };
+
+    fn hold(&mut self, at: [f64; 2], radius: f64) {
+        for (k, x) in at.into_iter().enumerate() {
+            self.low[k] = self.low[k].min(x - radius);
+            self.high[k] = self.high[k].max(x + radius);
+        }
+    }
+
+    /// Reaches around balls and triangles, too.
+    pub fn reach(&mut self, balls: &[Ball], plates: &[Plate]) {
+        balls
+            .iter()
+            .for_each(|ball| self.hold(ball.at, ball.radius));
+        for [x, y, _] in plates.iter().flat_map(|plate| plate.corners) {
+            self.hold([x, y], 0.0);
+        }
+    }
 }
 
 /// Pixels and their depths, and where they are.
@@ -40,19 +73,8 @@ fn brightness(right: f64, up: f64, front: f64) -> f64 {
 }
 
 impl Canvas {
-    /// A canvas around everything.
-    fn around(balls: &[Ball], plates: &[Plate]) -> Canvas {
-        let (mut low, mut high) = ([f64::INFINITY; 2], [f64::NEG_INFINITY; 2]);
-        let mut hold = |at: [f64; 2], radius: f64| {
-            for k in 0..2 {
-                low[k] = low[k].min(at[k] - radius);
-                high[k] = high[k].max(at[k] + radius);
-            }
-        };
-        balls.iter().for_each(|ball| hold(ball.at, ball.radius));
-        for [x, y, _] in plates.iter().flat_map(|plate| plate.corners) {
-            hold([x, y], 0.0);
-        }
+    /// A canvas over an extent.
+    fn over(Extent { low, high }: Extent) -> Canvas {
         let longer = (high[0] - low[0]).max(high[1] - low[1]);
         let margin = MARGIN * longer;
         let scale = SIZE / (longer + 2.0 * margin);
@@ -164,9 +186,21 @@ impl Canvas {
     }
 }
 
-/// Pixels as rows of RGB from the top, and their numbers along both edges.
+/// Pixels as rows of RGB from the top, and their numbers along both edges; around everything.
 pub fn paint(balls: &[Ball], plates: &[Plate], grounds: &[[[f64; 2]; 2]]) -> (Vec<u8>, [usize; 2]) {
-    let mut canvas = Canvas::around(balls, plates);
+    let mut extent = Extent::NOTHING;
+    extent.reach(balls, plates);
+    paint_over(extent, balls, plates, grounds)
+}
+
+/// The same over a given extent.
+pub fn paint_over(
+    extent: Extent,
+    balls: &[Ball],
+    plates: &[Plate],
+    grounds: &[[[f64; 2]; 2]],
+) -> (Vec<u8>, [usize; 2]) {
+    let mut canvas = Canvas::over(extent);
     canvas.lay(grounds);
     balls.iter().for_each(|ball| canvas.ball(ball));
     plates.iter().for_each(|plate| canvas.plate(plate));

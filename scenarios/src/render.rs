@@ -1,0 +1,441 @@
+//! Series of a run as pictures and as an animation (`colluvium render`).
+//!
+//! Grains are balls coloured by their speed or by what they hang together with; fields of a continuum are its cells
+//! coloured by speed. All pictures of a run have one frame and one scale of colours.
+
+use crate::failure::Failure;
+use crate::frames::{FIELDS, SERIES};
+use crate::report;
+use crate::run::world::pictures::canvas::{Ball, Extent, Plate, paint_over};
+use crate::run::world::pictures::{PALETTE, PLAIN, encode, fastest, speed_colour};
+use crate::run_directory::{ANIMATION, SUMMARY, summary_text, write_in_place};
+use crate::summary::{Figure, Summary};
+use crate::vtkhdf::{self, Cells, Frame};
+use std::borrow::Cow;
+use std::path::{Path, PathBuf};
+
+/// Folder of the pictures in a run directory.
+pub const FOLDER: &str = "animation";
+/// Instants from which on a run of grains draws its own animation.
+pub const FEWEST: usize = 10;
+/// How coarsely the colours of an animation are searched: 1 finest, 30 fastest.
+const PALETTE_SEARCH: i32 = 20;
+/// Pictures of a second, for the animations that runs draw.
+const PER_SECOND: u16 = 10;
+
+/// The axis that is looked along.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum View {
+    /// From the side: y to the left, z up.
+    X,
+    /// From the front: x to the right, z up.
+    Y,
+    /// From above: x to the right, y up.
+    Z,
+}
+
+impl View {
+    /// To the right, up, and depth.
+    fn axes(self, [x, y, z]: [f64; 3]) -> [f64; 3] {
+        match self {
+            View::X => [-y, z, x],
+            View::Y => [x, z, y],
+            View::Z => [x, y, -z],
+        }
+    }
+}
+
+/// What colours mean.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub enum Colour {
+    /// Speed.
+    Speed,
+    /// What hangs together, by contacts or bonds.
+    Cluster,
+}
+
+/// How a run is drawn.
+#[derive(Clone, Copy, Debug, PartialEq, Eq)]
+pub struct Request {
+    /// Direction.
+    pub view: View,
+    /// Colours.
+    pub colour: Colour,
+    /// Pictures of a second.
+    pub per_second: u16,
+}
+
+impl Default for Request {
+    fn default() -> Self {
+        Self {
+            view: View::Y,
+            colour: Colour::Speed,
+            per_second: PER_SECOND,
+        }
+    }
+}
+
+/// An instant as it is painted.
+struct Instant {
+    time: f64,
+    balls: Vec<Ball>,
+    plates: Vec<Plate>,
+}
+
+/// Draws the run in a directory; its report shows the animation from then on. Gives the animation's file.
+///
+/// # Errors
+/// Directories without a run or without series, files that cannot be read or written.
+pub fn render(directory: &Path, request: &Request) -> Result<PathBuf, Failure> {
+    let mut summary = report::read_summary(directory)?;
+    let figure = draw(directory, request)?;
+    place(&mut summary, figure);
+    let write = |name: &str, bytes: &[u8]| {
+        let path = directory.join(name);
+        write_in_place(&path, bytes)
+            .map_err(|error| Failure::Run(format!("cannot write {}: {error}", path.display())))
+    };
+    write(SUMMARY, summary_text(&summary)?.as_bytes())?;
+    report::write_for(&[directory.to_owned()], None)?;
+    Ok(directory.join(ANIMATION))
+}
+
+/// Draws the run that is about to end, if it has taken enough instants.
+///
+/// # Errors
+/// Files that cannot be read or written.
+pub fn render_own(directory: &Path, frames: usize, summary: &mut Summary) -> Result<(), Failure> {
+    if frames >= FEWEST {
+        place(summary, draw(directory, &Request::default())?);
+    }
+    Ok(())
+}
+
+/// Puts the animation before all other pictures.
+fn place(summary: &mut Summary, figure: Figure) {
+    let is_animation = |f: &Figure| matches!(f, Figure::Picture { file, .. } if file == ANIMATION);
+    summary.figures.retain(|f| !is_animation(f));
+    summary.figures.insert(0, figure);
+}
+
+/// Writes the pictures and the animation.
+fn draw(directory: &Path, request: &Request) -> Result<Figure, Failure> {
+    let (path, frames) = series(directory)?;
+    let refuse = |why: String| Failure::Input(format!("{}: {why}", path.display()));
+    let mut top = 0.0_f64;
+    for frame in &frames {
+        let speeds = moving_speeds(frame).map_err(refuse)?;
+        top = top.max(fastest(speeds.into_iter()));
+    }
+    let mut extent = Extent::NOTHING;
+    let mut instants = Vec::with_capacity(frames.len());
+    for frame in &frames {
+        let instant = instant(frame, request, top).map_err(refuse)?;
+        extent.reach(&instant.balls, &instant.plates);
+        instants.push(instant);
+    }
+    if instants
+        .iter()
+        .all(|i| i.balls.is_empty() && i.plates.is_empty())
+    {
+        return Err(refuse("nothing is in it".into()));
+    }
+    let failed = |what: &Path, error: String| {
+        Failure::Run(format!("cannot write {}: {error}", what.display()))
+    };
+    let folder = directory.join(FOLDER);
+    clear(&folder).map_err(|error| failed(&folder, error.to_string()))?;
+    let animation = directory.join(ANIMATION);
+    let colours = match request.colour {
+        Colour::Speed => format!("speed from 0 (violet) to {top:.3e} m/s (yellow)"),
+        Colour::Cluster => "what hangs together".to_owned(),
+    };
+    let last = instants.last().map_or(0.0, |i| i.time);
+    let count = instants.len();
+    let mut film = Film::new(request.per_second);
+    for (k, instant) in instants.iter().enumerate() {
+        let (pixels, size) = paint_over(extent, &instant.balls, &instant.plates, &[]);
+        let caption = format!("t = {:.4e} s; {colours}", instant.time);
+        let file = folder.join(format!("frame_{k:04}.png"));
+        encode(&pixels, size, &caption)
+            .map_err(|error| error.to_string())
+            .and_then(|png| write_in_place(&file, &png).map_err(|error| error.to_string()))
+            .map_err(|error| failed(&file, error))?;
+        film.add(&pixels, size, k + 1 == count)
+            .map_err(|error| failed(&animation, error.to_string()))?;
+    }
+    film.bytes()
+        .and_then(|bytes| Ok(write_in_place(&animation, &bytes)?))
+        .map_err(|error| failed(&animation, error.to_string()))?;
+    Ok(Figure::Picture {
+        file: ANIMATION.into(),
+        caption: format!("{count} instants up to t = {last:.4e} s; {colours}"),
+    })
+}
+
+/// An animation in the making.
+struct Film {
+    encoder: Option<gif::Encoder<Vec<u8>>>,
+    /// Time of a picture (1/100 s).
+    delay: u16,
+}
+
+impl Film {
+    /// How long the last picture stays (1/100 s).
+    const END: u16 = 100;
+
+    fn new(per_second: u16) -> Film {
+        Film {
+            encoder: None,
+            delay: 100 / per_second,
+        }
+    }
+
+    fn add(
+        &mut self,
+        pixels: &[u8],
+        [width, height]: [usize; 2],
+        last: bool,
+    ) -> Result<(), gif::EncodingError> {
+        // A canvas has at most some 720 pixels along each edge.
+        let (width, height) = (width as u16, height as u16);
+        let mut encoder = match self.encoder.take() {
+            Some(encoder) => encoder,
+            None => {
+                let mut begun = gif::Encoder::new(Vec::new(), width, height, &[])?;
+                begun.set_repeat(gif::Repeat::Infinite)?;
+                begun
+            }
+        };
+        let mut frame = gif::Frame::from_rgb_speed(width, height, pixels, PALETTE_SEARCH);
+        frame.delay = self.delay + if last { Self::END } else { 0 };
+        encoder.write_frame(&frame)?;
+        self.encoder = Some(encoder);
+        Ok(())
+    }
+
+    fn bytes(self) -> Result<Vec<u8>, gif::EncodingError> {
+        self.encoder
+            .map_or(Ok(Vec::new()), gif::Encoder::into_inner)
+    }
+}
+
+/// The series of a run that is drawn: grains, or fields where there are no grains.
+fn series(directory: &Path) -> Result<(PathBuf, Vec<Frame>), Failure> {
+    for name in [SERIES[0], FIELDS] {
+        let path = directory.join(format!("{name}.vtkhdf"));
+        if path.exists() {
+            let frames =
+                vtkhdf::read_series(&path).map_err(|error| Failure::Input(error.to_string()))?;
+            return Ok((path, frames));
+        }
+    }
+    Err(Failure::Input(format!(
+        "{}: holds neither grains.vtkhdf nor fields.vtkhdf; allowed: a run of grains with frames (output.frames > 0), or of a \
+         continuum with a free surface",
+        directory.display()
+    )))
+}
+
+/// Speeds of what may move (m/s).
+fn moving_speeds(frame: &Frame) -> Result<Vec<f64>, String> {
+    let fixed: Cow<[i64]> = match frame.cells {
+        Cells::Points => frame.counts("fixed")?.into(),
+        _ => vec![0; frame.vectors("velocity")?.len()].into(),
+    };
+    let speeds = frame.vectors("velocity")?.iter().map(speed);
+    Ok(speeds
+        .zip(fixed.iter())
+        .filter_map(|(speed, fixed)| (*fixed == 0).then_some(speed))
+        .collect())
+}
+
+fn speed(v: &[f64; 3]) -> f64 {
+    v.iter().map(|x| x * x).sum::<f64>().sqrt()
+}
+
+fn instant(frame: &Frame, request: &Request, top: f64) -> Result<Instant, String> {
+    let fast = |v: &[f64; 3]| speed_colour(speed(v) / top.max(f64::MIN_POSITIVE));
+    let velocity = frame.vectors("velocity")?;
+    let places = frame.points.iter().map(|&p| request.view.axes(p));
+    let (mut balls, mut plates) = (Vec::new(), Vec::new());
+    match frame.cells {
+        Cells::Points => {
+            let (radius, fixed) = (frame.scalars("radius")?, frame.counts("fixed")?);
+            let cluster = frame.counts("cluster")?;
+            let colour = |k: usize| match request.colour {
+                _ if fixed[k] != 0 => PLAIN,
+                Colour::Speed => fast(&velocity[k]),
+                Colour::Cluster => PALETTE[cluster[k].unsigned_abs() as usize % PALETTE.len()],
+            };
+            balls.extend(places.enumerate().map(|(k, [right, up, depth])| Ball {
+                at: [right, up],
+                depth,
+                radius: radius[k],
+                colour: colour(k),
+            }));
+        }
+        Cells::Quadrilaterals => {
+            let corners: Vec<[f64; 3]> = places.collect();
+            for (corners, velocity) in corners.as_chunks::<4>().0.iter().zip(velocity) {
+                let [a, b, c, d] = *corners;
+                let colour = fast(velocity);
+                plates.extend([[a, b, c], [a, c, d]].map(|corners| Plate { corners, colour }));
+            }
+        }
+        Cells::Lines => return Err("holds lines, not grains or cells".into()),
+    }
+    Ok(Instant {
+        time: frame.time,
+        balls,
+        plates,
+    })
+}
+
+/// An empty folder.
+fn clear(folder: &Path) -> std::io::Result<()> {
+    std::fs::create_dir_all(folder)?;
+    for entry in std::fs::read_dir(folder)? {
+        let entry = entry?;
+        let own = |name: &str| name.starts_with("frame_") && name.ends_with(".png");
+        if entry.file_name().to_str().is_some_and(own) {
+            std::fs::remove_file(entry.path())?;
+        }
+    }
+    Ok(())
+}
+
+/// Removes the pictures of an earlier run; files of other names stay.
+///
+/// # Errors
+/// Files that cannot be removed.
+pub fn remove(directory: &Path) -> std::io::Result<()> {
+    let folder = directory.join(FOLDER);
+    if !folder.is_dir() {
+        return Ok(());
+    }
+    clear(&folder)?;
+    match std::fs::remove_dir(&folder) {
+        Err(error) if error.kind() != std::io::ErrorKind::DirectoryNotEmpty => Err(error),
+        _ => Ok(()),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::vtkhdf::{Field, Values};
+
+    fn field(name: &str, values: Values) -> Field {
+        Field {
+            name: name.into(),
+            unit: "1".into(),
+            values,
+        }
+    }
+
+    /// A fixed grain, one at rest, and one that moves to the right by a radius an instant.
+    fn grains(k: usize) -> Frame {
+        Frame {
+            time: k as f64,
+            cells: Cells::Points,
+            points: vec![[0.0, 0.0, 0.0], [0.0, 0.0, 2.0], [3.0 + k as f64, 0.0, 2.0]],
+            fields: vec![
+                field("radius", Values::Scalars(vec![1.0; 3])),
+                field("fixed", Values::Counts(vec![1, 0, 0])),
+                field("cluster", Values::Counts(vec![0, 1, 2])),
+                field(
+                    "velocity",
+                    Values::Vectors(vec![[0.0; 3], [0.0; 3], [1.0, 0.0, 0.0]]),
+                ),
+            ],
+        }
+    }
+
+    fn run_directory(frames: Option<Vec<Frame>>) -> tempfile::TempDir {
+        let directory = tempfile::tempdir().unwrap();
+        let summary = Summary::begun("grains", "run");
+        let text = summary_text(&summary).unwrap();
+        std::fs::write(directory.path().join(SUMMARY), text).unwrap();
+        if let Some(frames) = frames {
+            let path = directory.path().join("grains.vtkhdf");
+            vtkhdf::write(&path, frames.into_iter().map(Ok)).unwrap();
+        }
+        directory
+    }
+
+    #[test]
+    fn a_series_becomes_pictures_and_an_animation() {
+        let run = run_directory(Some((0..4).map(grains).collect()));
+        for _ in 0..2 {
+            let animation = render(run.path(), &Request::default()).unwrap();
+            let mut options = gif::DecodeOptions::new();
+            options.set_color_output(gif::ColorOutput::RGBA);
+            let file = std::fs::File::open(animation).unwrap();
+            let mut film = options.read_info(file).unwrap();
+            let mut pictures = Vec::new();
+            while let Some(frame) = film.read_next_frame().unwrap() {
+                pictures.push((
+                    frame.width,
+                    frame.height,
+                    frame.buffer.to_vec(),
+                    frame.delay,
+                ));
+            }
+            assert_eq!(pictures.len(), 4);
+            assert_eq!((pictures[0].3, pictures[3].3), (10, 110));
+            // All instants reach from x = -1 to 7 and from z = -1 to 3.
+            let (width, height) = (f64::from(pictures[0].0), f64::from(pictures[0].1));
+            let scale = 720.0 / (8.0 * 1.08);
+            assert!((width - 720.0).abs() <= 1.0 && (height - scale * 4.64).abs() <= 1.0);
+            let colour = |k: usize, x: f64, z: f64| {
+                let (column, row) = (scale * (x + 1.32), scale * (3.32 - z));
+                let at = 4 * (row as usize * pictures[k].0 as usize + column as usize);
+                pictures[k].2[at..at + 3].to_vec()
+            };
+            for k in 0..4 {
+                let [plain, still, fast] = [
+                    colour(k, 0.0, 0.0),
+                    colour(k, 0.0, 2.0),
+                    colour(k, 3.0 + k as f64, 2.0),
+                ];
+                let spread = |c: &[u8]| c.iter().max().unwrap() - c.iter().min().unwrap();
+                assert!(spread(&plain) < 12, "{plain:?}");
+                assert!(
+                    still[2] > still[1] && still[0] > still[1],
+                    "violet: {still:?}"
+                );
+                assert!(fast[0] > 150 && fast[2] < 100, "yellow: {fast:?}");
+            }
+            assert_eq!(colour(3, 3.0, 2.0), [255, 255, 255], "it has gone on");
+            assert_eq!(
+                std::fs::read_dir(run.path().join(FOLDER)).unwrap().count(),
+                4
+            );
+            let summary = report::read_summary(run.path()).unwrap();
+            assert_eq!(summary.figures.len(), 1);
+            let page = std::fs::read_to_string(run.path().join("report.html")).unwrap();
+            assert_eq!(page.matches("data:image/gif;base64,").count(), 1);
+        }
+        remove(run.path()).unwrap();
+        assert!(!run.path().join(FOLDER).exists());
+    }
+
+    #[test]
+    fn what_cannot_be_drawn_is_told() {
+        let told = |run: &tempfile::TempDir| {
+            let failure = render(run.path(), &Request::default()).unwrap_err();
+            assert!(matches!(failure, Failure::Input(_)), "{failure}");
+            assert!(!run.path().join(ANIMATION).exists());
+            failure.to_string()
+        };
+        let without = told(&run_directory(None));
+        assert!(without.contains("grains.vtkhdf") && without.contains("output.frames"));
+        let mut old = grains(0);
+        old.fields.remove(0);
+        let old = told(&run_directory(Some(vec![old])));
+        assert!(old.contains("`radius`"), "{old}");
+        let nowhere = told(&tempfile::tempdir().unwrap());
+        assert!(nowhere.contains("no run directory"), "{nowhere}");
+    }
+}
