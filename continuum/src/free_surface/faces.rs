@@ -49,55 +49,66 @@ impl Face {
     }
 }
 
+/// Directions whose merits differ by less than this part are alike.
+pub(super) const ALIKE: f64 = 1e-6;
 /// Cells fuller than this are active.
 pub(crate) const ACTIVE: f64 = 0.5;
 /// Layers thinner than this part of a cell stick to a rough wall.
 pub(super) const THINNEST_LAYER: f64 = 1e-3;
 
 /// Roles of cells and faces.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Faces {
+#[derive(Debug, Clone)]
+pub(crate) struct Faces<const D: usize = DIMENSIONS> {
     /// Number of the unknown pressure of each cell, or [`NONE`].
     pub pressure: Vec<usize>,
     /// Cells with a pressure.
     pub active: Vec<usize>,
     /// Role of each face of each component.
-    pub role: [Vec<Face>; DIMENSIONS],
+    pub role: [Vec<Face>; D],
     /// Component and face of each unknown velocity.
     pub own: Vec<(usize, usize)>,
     /// Whether an unknown velocity belongs to a thin layer on a wall.
     pub is_thin: Vec<bool>,
     /// Over ground: velocity of each face, and of the edge across it, over the unknown that moves it.
-    pub shares: Option<[Vec<[f64; 2]>; DIMENSIONS]>,
-    pub(super) acceleration: [f64; DIMENSIONS],
+    pub shares: Option<[Vec<[f64; 2]>; D]>,
+    pub(super) acceleration: [f64; D],
 }
 
-impl Faces {
+impl<const D: usize> Faces<D> {
+    /// No roles yet, for so many cells.
+    pub(super) fn empty(cells: usize, acceleration: [f64; D]) -> Self {
+        Self {
+            pressure: vec![NONE; cells],
+            active: Vec::new(),
+            role: std::array::from_fn(|_| Vec::new()),
+            own: Vec::new(),
+            is_thin: Vec::new(),
+            shares: None,
+            acceleration,
+        }
+    }
+
     pub(crate) fn of(
-        grid: &Grid,
-        topology: &Topology,
+        grid: &Grid<D>,
+        topology: &Topology<D>,
         fractions: &[f64],
-        acceleration: [f64; DIMENSIONS],
+        acceleration: [f64; D],
         thin_layer: ThinLayer,
     ) -> Self {
-        let mut faces = Self {
-            acceleration,
-            pressure: vec![NONE; topology.cells()],
-            ..Self::default()
-        };
+        let mut faces = Self::empty(topology.cells(), acceleration);
         for (cell, &fraction) in fractions.iter().enumerate() {
             if fraction > ACTIVE {
                 faces.pressure[cell] = faces.active.len();
                 faces.active.push(cell);
             }
         }
-        for component in 0..DIMENSIONS {
+        for component in 0..D {
             let role = (0..topology.faces(component))
                 .map(|face| faces.own_role(grid, topology, fractions, thin_layer, component, face))
                 .collect();
             faces.role[component] = role;
         }
-        for component in 0..DIMENSIONS {
+        for component in 0..D {
             for face in 0..topology.faces(component) {
                 if faces.role[component][face] == Face::Loose
                     && let Some(host) = faces.host(topology, fractions, component, face)
@@ -112,8 +123,8 @@ impl Faces {
     /// The role of a face by itself; unknowns get their numbers.
     fn own_role(
         &mut self,
-        grid: &Grid,
-        topology: &Topology,
+        grid: &Grid<D>,
+        topology: &Topology<D>,
         fractions: &[f64],
         thin_layer: ThinLayer,
         component: usize,
@@ -145,7 +156,7 @@ impl Faces {
     /// The unknown of the nearest face that has one, the direction into the material first.
     pub(super) fn host(
         &self,
-        topology: &Topology,
+        topology: &Topology<D>,
         fractions: &[f64],
         component: usize,
         face: usize,
@@ -158,18 +169,28 @@ impl Faces {
                 topology.face_mean(component, at, fractions)
             }
         };
-        let mut directions: [(f64, usize, usize); DIMENSIONS] = std::array::from_fn(|axis| {
+        let mut directions: [(f64, usize, usize); D] = std::array::from_fn(|axis| {
             let [low, high] = beside[axis].map(mass);
             ((high - low).abs(), axis, usize::from(high >= low))
         });
         directions.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        let own = |at: usize| match at {
-            NONE => None,
-            at => match self.role[component][at] {
-                Face::Own(j) => Some(j),
-                _ => None,
-            },
-        };
+        if let [first, second, ..] = directions[..]
+            && D > 2
+            && first.0 - second.0 <= ALIKE * first.0
+        {
+            // Two directions of equal merit: between them, or else upright, so that what mirrors itself
+            // has a host that does.
+            let step = |at: usize, (_, axis, side): (f64, usize, usize)| match at {
+                NONE => NONE,
+                at => topology.face_neighbours[component][at][axis][side],
+            };
+            let between = self.own_at(component, step(step(face, first), second));
+            if between.is_some() {
+                return between;
+            }
+            directions.sort_by_key(|&(_, axis, _)| axis != D - 1);
+        }
+        let own = |at: usize| self.own_at(component, at);
         let along = directions.iter().map(|&(_, axis, side)| beside[axis][side]);
         let diagonal = directions
             .iter()
@@ -189,16 +210,27 @@ impl Faces {
         along.chain(diagonal).chain(against).find_map(own)
     }
 
+    /// The unknown of a face itself.
+    fn own_at(&self, component: usize, at: usize) -> Option<usize> {
+        match at {
+            NONE => None,
+            at => match self.role[component][at] {
+                Face::Own(j) => Some(j),
+                _ => None,
+            },
+        }
+    }
+
     /// The axis and the side (0 low, 1 high) of a wall along a face that carries the weight of what
     /// lies on it, if there is one.
     pub(crate) fn wall_under(
         &self,
-        grid: &Grid,
-        topology: &Topology,
+        grid: &Grid<D>,
+        topology: &Topology<D>,
         component: usize,
         face: usize,
     ) -> Option<(usize, usize)> {
-        let other = (0..DIMENSIONS).filter(|&axis| axis != component);
+        let other = (0..D).filter(|&axis| axis != component);
         other
             .flat_map(|axis| [(axis, 0), (axis, 1)])
             .find(|&(axis, side)| {
@@ -222,7 +254,7 @@ impl Faces {
     }
 
     /// Gives every face that follows the velocity of its unknown.
-    pub(crate) fn spread(&self, unknowns: &[f64], velocity: &mut Velocity) {
+    pub(crate) fn spread(&self, unknowns: &[f64], velocity: &mut Velocity<D>) {
         if let Some(shares) = &self.shares {
             for ((roles, shares), u) in self.role.iter().zip(shares).zip(velocity) {
                 for ((role, [share, _]), u) in roles.iter().zip(shares).zip(u) {
@@ -250,7 +282,12 @@ impl Faces {
 }
 
 /// Whether a face lies above all material of the cell beside a wall, which cannot fall further.
-fn lies_on_wall(topology: &Topology, fractions: &[f64], component: usize, face: usize) -> bool {
+fn lies_on_wall<const D: usize>(
+    topology: &Topology<D>,
+    fractions: &[f64],
+    component: usize,
+    face: usize,
+) -> bool {
     (0..2).any(|side| {
         let cell = topology.face_cells[component][face][side];
         let other = topology.face_cells[component][face][1 - side];
@@ -259,7 +296,7 @@ fn lies_on_wall(topology: &Topology, fractions: &[f64], component: usize, face: 
 }
 
 /// Gravity normal to a wall on one side of an axis, positive towards the wall.
-pub(crate) fn weight_onto(acceleration: &[f64; DIMENSIONS], axis: usize, side: usize) -> f64 {
+pub(crate) fn weight_onto<const D: usize>(acceleration: &[f64; D], axis: usize, side: usize) -> f64 {
     let towards = if side == 1 { 1.0 } else { -1.0 };
     (towards * acceleration[axis]).max(0.0)
 }
