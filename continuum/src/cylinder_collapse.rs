@@ -86,7 +86,10 @@ impl CylinderCase {
             self.length_scaled * self.aspect > 1.0,
             "grid.length_scaled",
             self.length_scaled,
-            format!("greater than the radius over the height, {}", 1.0 / self.aspect),
+            format!(
+                "greater than the radius over the height, {}",
+                1.0 / self.aspect
+            ),
         )?;
         let per_height = self.cells as f64 / self.length_scaled;
         let smallest = per_height.min(per_height / self.aspect);
@@ -108,7 +111,11 @@ impl CylinderCase {
 
     /// Cells along x or y.
     fn columns(&self) -> usize {
-        if self.whole { 2 * self.cells } else { self.cells }
+        if self.whole {
+            2 * self.cells
+        } else {
+            self.cells
+        }
     }
 
     /// Cells from the axis of the cylinder to that cell, the nearest counting 0.
@@ -140,7 +147,10 @@ impl CylinderCase {
         let mut layer = Vec::with_capacity(columns * columns);
         for j in 0..columns {
             for i in 0..columns {
-                layer.push(disc_in_cell(radius, [i, j].map(|n| self.from_axis(n) as f64)));
+                layer.push(disc_in_cell(
+                    radius,
+                    [i, j].map(|n| self.from_axis(n) as f64),
+                ));
             }
         }
         let mut fractions = Vec::with_capacity(rows * layer.len());

@@ -269,7 +269,8 @@ mod tests {
             [1, 2],
         ];
         let coefficients = [2.0, 1.0, 1.0, 1.0, 1.0, 1.0, 2.0, g];
-        let (mut system, slots) = SparseSystem::new(3, entries.to_vec(), method, None::<&[Place]>).unwrap();
+        let (mut system, slots) =
+            SparseSystem::new(3, entries.to_vec(), method, None::<&[Place]>).unwrap();
         for (slot, c) in slots.iter().zip(coefficients) {
             system.values_mut()[*slot as usize] += c;
         }

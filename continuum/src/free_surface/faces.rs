@@ -296,7 +296,11 @@ fn lies_on_wall<const D: usize>(
 }
 
 /// Gravity normal to a wall on one side of an axis, positive towards the wall.
-pub(crate) fn weight_onto<const D: usize>(acceleration: &[f64; D], axis: usize, side: usize) -> f64 {
+pub(crate) fn weight_onto<const D: usize>(
+    acceleration: &[f64; D],
+    axis: usize,
+    side: usize,
+) -> f64 {
     let towards = if side == 1 { 1.0 } else { -1.0 };
     (towards * acceleration[axis]).max(0.0)
 }

@@ -20,6 +20,8 @@ const LEVEL: f64 = 0.3;
 /// Planes whose misses differ by less than this part, or by the round-off of exact ones, are averaged in
 /// space: what mirrors itself has mirrored candidates of equal merit.
 const ALIKE: f64 = 1e-6;
+/// Cells in space with less material are level: dust has no shape.
+const SHAPELESS: f64 = 1e-10;
 /// The square of round-off.
 const EXACT: f64 = 1e-24;
 
@@ -116,7 +118,11 @@ impl<'a, const D: usize> Neighbourhood<'a, D> {
                 let next = self.topology.cell_neighbours[at][axis][side];
                 if done || next == NONE {
                     // A wall below is full like the cells below.
-                    height += if side == inner { (REACH - walked) as f64 } else { 0.0 };
+                    height += if side == inner {
+                        (REACH - walked) as f64
+                    } else {
+                        0.0
+                    };
                     break;
                 }
                 at = next;
@@ -146,10 +152,13 @@ impl<'a, const D: usize> Neighbourhood<'a, D> {
 
 /// The plane in a partly filled cell.
 fn plane_in<const D: usize>(topology: &Topology<D>, fractions: &[f64], cell: usize) -> Plane {
-    let around = Neighbourhood::around(topology, fractions, cell);
     let mut up = [0.0; 3];
     up[D - 1] = 1.0;
     let mut best = Plane::of_fraction(up, fractions[cell]);
+    if D > 2 && fractions[cell] < SHAPELESS {
+        return best;
+    }
+    let around = Neighbourhood::around(topology, fractions, cell);
     let mut least = f64::INFINITY;
     // Sum of the normals of planes as good as the best, and their number.
     let (mut sum, mut count) = ([0.0; 3], 0);

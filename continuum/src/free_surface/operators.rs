@@ -255,7 +255,9 @@ impl<const D: usize> Material<'_, D> {
             self.add_corner_pressure(at, &mut point);
             if !point.velocities().is_empty() {
                 let last = D - 1;
-                point.side = axes[last].boundary_at(at[last]).map(|_| usize::from(at[last] > 0));
+                point.side = axes[last]
+                    .boundary_at(at[last])
+                    .map(|_| usize::from(at[last] > 0));
                 points.push(point);
                 places.push(cell * points_of(D) + corner);
             }
@@ -286,12 +288,13 @@ impl<const D: usize> Material<'_, D> {
         if self.faces.pressure[cell] != NONE {
             point.add_pressure(self.faces.pressure[cell], 1.0);
         } else {
-            let (axis, side) = (0..D)
-                .flat_map(|axis| [(axis, 0), (axis, 1)])
-                .find(|&(axis, side)| {
-                    self.topology.cell_neighbours[cell][axis][side] == NONE
-                        && weight_onto(&self.acceleration, axis, side) > 0.0
-                })?;
+            let (axis, side) =
+                (0..D)
+                    .flat_map(|axis| [(axis, 0), (axis, 1)])
+                    .find(|&(axis, side)| {
+                        self.topology.cell_neighbours[cell][axis][side] == NONE
+                            && weight_onto(&self.acceleration, axis, side) > 0.0
+                    })?;
             let thickness = self.fractions[cell] * self.grid.axes()[axis].spacing();
             point.pressure_offset = 0.5 * thickness * weight_onto(&self.acceleration, axis, side);
         }

@@ -241,7 +241,10 @@ mod tests {
                 }
                 let exact = exact / (6.0 * normal.iter().map(|m| m.abs()).product::<f64>());
                 let volume = plane.volume_in(UNIT.0, UNIT.1);
-                assert!((volume - exact).abs() < 2e-13, "{normal:?} {offset} {volume} {exact}");
+                assert!(
+                    (volume - exact).abs() < 2e-13,
+                    "{normal:?} {offset} {volume} {exact}"
+                );
             }
         }
     }

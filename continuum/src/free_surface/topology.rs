@@ -55,20 +55,19 @@ impl<const D: usize> Topology<D> {
                 row
             }
         };
-        let replaced = |index: [usize; D],
-                        axis: usize,
-                        position: Option<usize>,
-                        counts: [usize; D]| {
-            position.map_or(NONE, |position| {
-                let mut index = index;
-                if axis == 0 {
-                    let last = D - 1;
-                    index[last] = shifted(index[last], index[0], position, counts[0], counts[last]);
-                }
-                index[axis] = position;
-                flatten(index, counts)
-            })
-        };
+        let replaced =
+            |index: [usize; D], axis: usize, position: Option<usize>, counts: [usize; D]| {
+                position.map_or(NONE, |position| {
+                    let mut index = index;
+                    if axis == 0 {
+                        let last = D - 1;
+                        index[last] =
+                            shifted(index[last], index[0], position, counts[0], counts[last]);
+                    }
+                    index[axis] = position;
+                    flatten(index, counts)
+                })
+            };
         let all_beside = |index: [usize; D], counts: [usize; D]| {
             std::array::from_fn(|axis| {
                 beside(&axes[axis], index[axis], counts[axis])

@@ -20,6 +20,9 @@ use crate::grid::DIMENSIONS;
 /// A velocity whose mass is below this fraction of a cell has no momentum of its own.
 pub(crate) const MASSLESS: f64 = 1e-12;
 
+/// Less of a cell than this is nothing, far below the round-off of what surrounds it.
+const NOTHING: f64 = 1e-20;
+
 /// Velocities on all faces, component by component.
 pub(crate) type Velocity<const D: usize = DIMENSIONS> = [Vec<f64>; D];
 
@@ -272,8 +275,12 @@ impl<const D: usize> Transport<D> {
             };
             self.total_dilatation[cell] += dilatation;
             self.dilatation.push(dilatation);
-            self.next
-                .push(fraction - (self.fluxes[high] - self.fluxes[low]) + dilatation);
+            let mut next = fraction - (self.fluxes[high] - self.fluxes[low]) + dilatation;
+            // In space dust gets everywhere, and thinner with every step.
+            if D > 2 && next.abs() < NOTHING {
+                next = 0.0;
+            }
+            self.next.push(next);
         }
     }
 

@@ -97,7 +97,8 @@ impl StepMatrix {
             // C is symmetric.
             for row in 0..velocities {
                 // Row of Bᵀ W C, then of Bᵀ W g.
-                let left: [f64; C] = std::array::from_fn(|a| point.weight * point.force(row, &c[a]));
+                let left: [f64; C] =
+                    std::array::from_fn(|a| point.weight * point.force(row, &c[a]));
                 for (column, &slot) in (0..velocities).zip(slots.by_ref()) {
                     values[slot as usize] += point.force(column, &left);
                 }

@@ -388,8 +388,7 @@ impl<const C: usize> PrimalDual<C> {
         for (point, s) in problem.discretisation.points().iter().zip(&self.trial.s) {
             let (gamma, rate, threshold) =
                 evaluate(problem.rheology, point, &self.trial.u, &self.trial.p, floor);
-            let miss: [f64; C] =
-                std::array::from_fn(|a| s[a] * rate - threshold.stress * gamma[a]);
+            let miss: [f64; C] = std::array::from_fn(|a| s[a] * rate - threshold.stress * gamma[a]);
             let scale = rate * (threshold.stress + 1e-3);
             stress = largest_or_nan(stress, strain_rate_norm(miss) / scale);
         }

@@ -85,7 +85,12 @@ impl<const D: usize> Ground<D> {
     /// Gives what a cell holds too much to its neighbours, as much as they have room for, and the rest
     /// to the one above, or where that is shut off to the one with the widest way to it. Says which one may
     /// hold too much now.
-    fn push_out(&self, topology: &Topology<D>, fractions: &mut [f64], cell: usize) -> Option<usize> {
+    fn push_out(
+        &self,
+        topology: &Topology<D>,
+        fractions: &mut [f64],
+        cell: usize,
+    ) -> Option<usize> {
         let mut excess = fractions[cell] - self.free[cell];
         if excess <= EXCESS {
             return None;

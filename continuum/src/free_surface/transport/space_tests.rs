@@ -52,7 +52,10 @@ fn ball(cells: usize, centre: [f64; 3], radius: f64) -> Vec<f64> {
             let sum: f64 = (0..parts * parts * parts)
                 .map(|part| {
                     let step = unflatten(part, [parts; 3]);
-                    inside(std::array::from_fn(|a| low[a] + step[a] as f64 * size), size)
+                    inside(
+                        std::array::from_fn(|a| low[a] + step[a] as f64 * size),
+                        size,
+                    )
                 })
                 .sum();
             sum / (parts * parts * parts) as f64
@@ -144,7 +147,11 @@ fn drawn_out_error(cells: usize) -> f64 {
         );
     }
     let now: f64 = fractions.iter().sum();
-    assert!((now / volume - 1.0).abs() < 1e-13, "{:e}", now / volume - 1.0);
+    assert!(
+        (now / volume - 1.0).abs() < 1e-13,
+        "{:e}",
+        now / volume - 1.0
+    );
     for f in &fractions {
         assert!((-1e-13..=1.0 + 1e-12).contains(f), "{f:e} {:e}", f - 1.0);
     }
@@ -153,10 +160,10 @@ fn drawn_out_error(cells: usize) -> f64 {
 
 #[test]
 fn ball_is_drawn_out_and_back() {
-    let errors = [16, 32].map(drawn_out_error);
+    let errors = [12, 24].map(drawn_out_error);
     let order = (errors[0] / errors[1]).log2();
     eprintln!("drawn-out ball: errors {errors:?}, order {order}");
-    assert!(errors[1] < 1e-3 && order > 1.5, "{errors:?} {order}");
+    assert!(errors[1] < 2e-3 && order > 1.5, "{errors:?} {order}");
 }
 
 /// Planes of any direction are found exactly, from the fractions alone.
@@ -180,7 +187,10 @@ fn planes_are_reconstructed_exactly() {
         };
         let fractions: Vec<f64> = (0..topology.cells())
             .map(|cell| {
-                let plane = Plane { normal, offset: offset(cell) };
+                let plane = Plane {
+                    normal,
+                    offset: offset(cell),
+                };
                 plane.volume_in([0.0; 3], [1.0; 3])
             })
             .collect();
@@ -188,8 +198,12 @@ fn planes_are_reconstructed_exactly() {
         reconstruct(&topology, &fractions, &mut planes);
         let mut found = 0;
         for (cell, plane) in planes.iter().enumerate() {
-            let inside = unflatten(cell, [cells; 3]).iter().all(|i| (3..6).contains(i));
-            let Some(plane) = plane.filter(|_| inside) else { continue };
+            let inside = unflatten(cell, [cells; 3])
+                .iter()
+                .all(|i| (3..6).contains(i));
+            let Some(plane) = plane.filter(|_| inside) else {
+                continue;
+            };
             found += 1;
             for (a, b) in plane.normal.iter().zip(normal) {
                 assert!((a - b).abs() < 1e-9, "{plane:?} {normal:?}");
@@ -203,7 +217,14 @@ fn planes_are_reconstructed_exactly() {
 /// stay, and the ball keeps its shape. A ball that mirrors itself across the diagonal still does.
 #[test]
 fn uniform_motion_is_exact() {
-    let cells = 20;
+    let misses = [12, 24].map(translated);
+    let order = (misses[0] / misses[1]).log2();
+    eprintln!("translated ball misses {misses:?} of its volume, order {order}");
+    assert!(misses[1] < 0.02 && order > 1.5, "{misses:?}");
+}
+
+/// Part of its volume by which a ball that moved half a period misses its place.
+fn translated(cells: usize) -> f64 {
     let topology = topology(periodic(cells));
     let mut fractions = ball(cells, [0.4, 0.4, 0.45], 0.25);
     let count = cells.pow(3);
@@ -211,13 +232,14 @@ fn uniform_motion_is_exact() {
     let mut velocity = velocity_of.map(|u| vec![u; count]);
     let mut transport = Transport::default();
     let volume: f64 = fractions.iter().sum();
-    for n in 0..40 {
+    let courant = 0.25;
+    for n in 0..2 * cells {
         step(
             &mut transport,
             &topology,
             &mut fractions,
             &mut velocity,
-            (0.25, n),
+            (courant, n),
         );
     }
     for (component, expected) in velocity_of.into_iter().enumerate() {
@@ -237,10 +259,10 @@ fn uniform_motion_is_exact() {
     let centre = [0.4, 0.4, 0.45];
     let moved = ball(
         cells,
-        std::array::from_fn(|a| centre[a] + 10.0 / cells as f64 * velocity_of[a]),
+        std::array::from_fn(|a| centre[a] + 0.5 * velocity_of[a]),
         0.25,
     );
     let miss = difference(&fractions, &moved) / volume;
-    eprintln!("translated ball misses {miss:e} of its volume, asymmetry {asymmetry:e}");
-    assert!(miss < 0.02 && asymmetry < 1e-11, "{miss} {asymmetry:e}");
+    assert!(asymmetry < 1e-12, "{asymmetry:e}");
+    miss
 }
