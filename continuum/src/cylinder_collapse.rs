@@ -119,7 +119,7 @@ impl CylinderCase {
     }
 
     /// Cells from the axis of the cylinder to that cell, the nearest counting 0.
-    fn from_axis(&self, cell: usize) -> usize {
+    fn cells_to_axis(&self, cell: usize) -> usize {
         match (self.whole, cell.checked_sub(self.cells)) {
             (false, _) => cell,
             (true, Some(beyond)) => beyond,
@@ -149,7 +149,7 @@ impl CylinderCase {
             for i in 0..columns {
                 layer.push(disc_in_cell(
                     radius,
-                    [i, j].map(|n| self.from_axis(n) as f64),
+                    [i, j].map(|n| self.cells_to_axis(n) as f64),
                 ));
             }
         }

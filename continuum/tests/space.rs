@@ -207,7 +207,10 @@ fn plane_flow_is_the_same_along_x_and_y() {
         let count = columns[0].cells() * columns[1].cells();
         let mut worst = 0.0_f64;
         for (column, u) in flow.state().velocity[component].iter().enumerate() {
-            worst = worst.max((u - expected[column / count]).abs());
+            // Above the surface there is nothing that could move.
+            if (column / count) as f64 * 1.25 / cells as f64 <= 1.0 {
+                worst = worst.max((u - expected[column / count]).abs());
+            }
         }
         eprintln!("{columns:?}: differs by {worst:e}");
         assert!(worst < 1e-5, "{columns:?} {worst:e}");
@@ -281,8 +284,8 @@ fn cylinder_runs_out_as_far_as_measured() {
     assert!(at_rest && collapse.time() < 6.0, "{}", collapse.time());
     assert!(BAND.contains(&runout(&collapse, &case)));
     let stiff = MuI::new(2.0, 2.2, 0.279, 0.02, 1.0, 1.0);
-    let case = cylinder(1.0, 20, stiff);
-    let (collapse, _) = run(&case, &SurfaceOptions::default(), 12.0);
+    let case = cylinder(1.0, 12, stiff);
+    let (collapse, _) = run(&case, &SurfaceOptions::default(), 4.0);
     assert!(runout(&collapse, &case) < BAND.start);
 }
 
@@ -298,15 +301,15 @@ fn run_outs_by_aspect_ratio_and_grid() {
     }
 }
 
-/// A whole cylinder mirrors itself across both axes and the diagonal. To the tolerance of the solver as it
-/// is; to round-off (which a flow amplifies) if the equations of a step are solved that far.
+/// A whole cylinder mirrors itself across both axes and the diagonal: to round-off, which the flow
+/// amplifies, if the equations of a step are solved that far; to the tolerance of the solver as it is.
 #[test]
 fn whole_cylinder_stays_symmetric() {
     let mut case = cylinder(1.0, 10, beads());
     case.whole = true;
     for (solver, bound) in [
-        (SurfaceOptions::default().solver, 1e-2),
-        (exact(SurfaceOptions::default().solver), 1e-7),
+        (SurfaceOptions::default().solver, 1e-5),
+        (exact(SurfaceOptions::default().solver), 1e-10),
     ] {
         let options = SurfaceOptions {
             solver,

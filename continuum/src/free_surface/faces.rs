@@ -6,6 +6,7 @@
 //! it, so mass and momentum of a step are complete. Material that nothing active touches is
 //! *loose*: it flies.
 
+use super::operators::EMPTY;
 use super::topology::{NONE, Topology};
 use super::transport::{MASSLESS, Velocity};
 use crate::grid::{DIMENSIONS, Grid};
@@ -174,21 +175,8 @@ impl<const D: usize> Faces<D> {
             ((high - low).abs(), axis, usize::from(high >= low))
         });
         directions.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        if let [first, second, ..] = directions[..]
-            && D > 2
-            && first.0 - second.0 <= ALIKE * first.0
-        {
-            // Two directions of equal merit: between them, or else upright, so that what mirrors itself
-            // has a host that does.
-            let step = |at: usize, (_, axis, side): (f64, usize, usize)| match at {
-                NONE => NONE,
-                at => topology.face_neighbours[component][at][axis][side],
-            };
-            let between = self.own_at(component, step(step(face, first), second));
-            if between.is_some() {
-                return between;
-            }
-            directions.sort_by_key(|&(_, axis, _)| axis != D - 1);
+        if D > 2 {
+            return self.unbiased_host(topology, component, face, directions);
         }
         let own = |at: usize| self.own_at(component, at);
         let along = directions.iter().map(|&(_, axis, side)| beside[axis][side]);
@@ -208,6 +196,75 @@ impl<const D: usize> Faces<D> {
             .iter()
             .map(|&(_, axis, side)| beside[axis][1 - side]);
         along.chain(diagonal).chain(against).find_map(own)
+    }
+
+    /// The same where no direction may be preferred to its mirror image: faces of equal merit are asked
+    /// together, and answer only if one of them alone has an unknown.
+    fn unbiased_host(
+        &self,
+        topology: &Topology<D>,
+        component: usize,
+        face: usize,
+        directions: [(f64, usize, usize); D],
+    ) -> Option<usize> {
+        let step = |at: usize, axis: usize, side: usize| match at {
+            NONE => NONE,
+            at => topology.face_neighbours[component][at][axis][side],
+        };
+        // Number of the first of the directions that are as good.
+        let most = directions[0].0;
+        let mut rank = [0; D];
+        for n in 1..D {
+            let alike = directions[n - 1].0 - directions[n].0 <= ALIKE * most;
+            rank[n] = if alike { rank[n - 1] } else { n };
+        }
+        let level = |n: usize| directions[n].0 <= ALIKE * most;
+        let mut any = None;
+        let mut single = |faces: &mut dyn Iterator<Item = usize>| {
+            let mut found = faces.filter_map(|at| self.own_at(component, at));
+            let first = found.next();
+            any = any.or(first);
+            first.filter(|host| found.all(|other| other == *host))
+        };
+        let towards = |n: usize| step(face, directions[n].1, directions[n].2);
+        let against = |n: usize| step(face, directions[n].1, 1 - directions[n].2);
+        for group in (0..D).filter(|&n| rank[n] == n) {
+            let members = || (0..D).filter(move |&n| rank[n] == group);
+            let host = if level(group) {
+                single(&mut members().flat_map(|n| [towards(n), against(n)]))
+            } else {
+                let pairs = members().flat_map(|n| members().map(move |m| (n, m)));
+                let between = pairs
+                    .filter(|(n, m)| n < m)
+                    .map(|(n, m)| step(towards(n), directions[m].1, directions[m].2));
+                single(&mut members().map(towards)).or_else(|| single(&mut { between }))
+            };
+            if host.is_some() {
+                return host;
+            }
+        }
+        for first in (0..D).filter(|&n| rank[n] == n && !level(n)) {
+            for second in (0..D).filter(|&n| rank[n] == n && n > first && !level(n)) {
+                let pairs = (0..D).filter(|&n| rank[n] == first).flat_map(|n| {
+                    let others = (0..D).filter(move |&m| rank[m] == second);
+                    others.map(move |m| (n, m))
+                });
+                let mut diagonal =
+                    pairs.map(|(n, m)| step(towards(n), directions[m].1, directions[m].2));
+                let host = single(&mut diagonal);
+                if host.is_some() {
+                    return host;
+                }
+            }
+        }
+        for group in (0..D).filter(|&n| rank[n] == n && !level(n)) {
+            let host = single(&mut (0..D).filter(|&n| rank[n] == group).map(against));
+            if host.is_some() {
+                return host;
+            }
+        }
+        // Material must not be lost; what is empty may do without.
+        any.filter(|_| most > 0.0)
     }
 
     /// The unknown of a face itself.
@@ -240,7 +297,12 @@ impl<const D: usize> Faces<D> {
                     .boundary_at(edge)
                     .is_some_and(|boundary| boundary.outer_pressure().is_none());
                 let along = self.acceleration[component].abs();
-                ends && rigid && weight_onto(&self.acceleration, axis, side) > along
+                let weight = weight_onto(&self.acceleration, axis, side);
+                // In a corner it is the wall that carries the most.
+                let is_floor = (0..D)
+                    .filter(|&other| other != component)
+                    .all(|other| weight >= self.acceleration[other].abs());
+                ends && rigid && weight > along && is_floor
             })
     }
 
@@ -282,16 +344,19 @@ impl<const D: usize> Faces<D> {
 }
 
 /// Whether a face lies above all material of the cell beside a wall, which cannot fall further.
+///
+/// In space dust above does not count.
 fn lies_on_wall<const D: usize>(
     topology: &Topology<D>,
     fractions: &[f64],
     component: usize,
     face: usize,
 ) -> bool {
+    let empty = if D == 2 { 0.0 } else { EMPTY };
     (0..2).any(|side| {
         let cell = topology.face_cells[component][face][side];
         let other = topology.face_cells[component][face][1 - side];
-        topology.cell_neighbours[cell][component][side] == NONE && fractions[other] <= 0.0
+        topology.cell_neighbours[cell][component][side] == NONE && fractions[other] <= empty
     })
 }
 

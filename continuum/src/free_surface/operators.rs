@@ -108,6 +108,12 @@ impl<const D: usize> Material<'_, D> {
         mass
     }
 
+    /// The surface in a cell. In space dust has none: where some of it lies is a matter of round-off.
+    fn plane(&self, cell: usize) -> Option<&Plane> {
+        let plane = self.planes[cell].as_ref();
+        plane.filter(|_| D == 2 || self.fractions[cell] > EMPTY)
+    }
+
     /// Distance θ, in cells, from the centre of an active cell to the surface on the way to its
     /// inactive neighbour along an axis.
     pub(super) fn surface_distance(
@@ -121,7 +127,7 @@ impl<const D: usize> Material<'_, D> {
         step[axis] = if side == 1 { 1.0 } else { -1.0 };
         let back = step.map(|s| -s);
         let here = [0.0; D];
-        let (inner, outer) = match (&self.planes[active], &self.planes[other]) {
+        let (inner, outer) = match (self.plane(active), self.plane(other)) {
             (Some(a), Some(b)) => (depth_of_centre(a, here), depth_of_centre(b, here)),
             (Some(a), None) => (depth_of_centre(a, here), depth_of_centre(a, step)),
             (None, Some(b)) => (depth_of_centre(b, back), depth_of_centre(b, here)),
@@ -378,7 +384,7 @@ impl<const D: usize> Material<'_, D> {
             if inner == NONE || self.faces.pressure[inner] == NONE {
                 return None;
             }
-            let plane = self.planes[cell].as_ref().or(self.planes[inner].as_ref());
+            let plane = self.plane(cell).or(self.plane(inner));
             let level = plane.map_or(1.0, |plane| {
                 plane.normal[axis] * if side == 1 { -1.0 } else { 1.0 }
             });

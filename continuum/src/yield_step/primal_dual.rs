@@ -243,14 +243,10 @@ impl<const C: usize> PrimalDual<C> {
         let linear = &self.points;
         self.matrix
             .fill(discretisation, problem.dt, &self.released, |q| {
-                let mut c = linear[q].by_rate;
-                for a in 1..C {
-                    for b in 0..a {
-                        let mean = 0.5 * (c[b][a] + c[a][b]);
-                        c[b][a] = mean;
-                        c[a][b] = mean;
-                    }
-                }
+                let by_rate = &linear[q].by_rate;
+                let c = std::array::from_fn(|a| {
+                    std::array::from_fn(|b| 0.5 * (by_rate[a][b] + by_rate[b][a]))
+                });
                 (c, linear[q].by_pressure)
             });
         let velocities = discretisation.velocities();
