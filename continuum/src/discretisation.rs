@@ -13,11 +13,9 @@ use crate::wall_friction::{PointLaw, SideWalls};
 
 /// Components of the strain rate (and of the deviatoric stress) in a plane flow.
 pub const COMPONENTS: usize = 2;
-/// Most velocities that one quadrature point depends on: four faces of the cell, and one more of
-/// each component across the corner.
-const MAX_VELOCITIES: usize = 6;
-/// Most cells from which the pressure at a corner is interpolated.
-const MAX_PRESSURES: usize = 4;
+/// Most velocities that one quadrature point of a plane flow depends on: four faces of the cell, and one
+/// more of each component across the corner. It is at least the number of pressures, too.
+pub const VELOCITIES: usize = 6;
 
 /// Where the pressure of the threshold is taken.
 #[derive(Debug, Clone, Copy, PartialEq, Eq, Default, serde::Serialize, serde::Deserialize)]
@@ -33,17 +31,17 @@ pub enum ThresholdPressure {
 
 /// A pair of a cell and a corner, with its rows of the strain-rate and interpolation operators.
 #[derive(Debug, Clone)]
-pub struct QuadraturePoint {
+pub struct QuadraturePoint<const C: usize = COMPONENTS, const V: usize = VELOCITIES> {
     /// Share of the cell's volume.
     pub(crate) weight: f64,
-    velocities: [usize; MAX_VELOCITIES],
+    velocities: [usize; V],
     velocity_count: usize,
-    rates: [[f64; MAX_VELOCITIES]; COMPONENTS],
+    rates: [[f64; V]; C],
     /// Strain rate due to moving walls.
-    offset: [f64; COMPONENTS],
-    pressures: [usize; MAX_PRESSURES],
+    offset: [f64; C],
+    pressures: [usize; V],
     pressure_count: usize,
-    pressure_weights: [f64; MAX_PRESSURES],
+    pressure_weights: [f64; V],
     /// Part of the threshold pressure that is known beforehand.
     pub(crate) pressure_offset: f64,
     /// The boundary across z on which the corner lies: 0 low, 1 high.
@@ -52,17 +50,17 @@ pub struct QuadraturePoint {
     pub(crate) law: PointLaw,
 }
 
-impl QuadraturePoint {
+impl<const C: usize, const V: usize> QuadraturePoint<C, V> {
     pub(crate) fn new(weight: f64) -> Self {
         Self {
             weight,
-            velocities: [0; MAX_VELOCITIES],
+            velocities: [0; V],
             velocity_count: 0,
-            rates: [[0.0; MAX_VELOCITIES]; COMPONENTS],
-            offset: [0.0; COMPONENTS],
-            pressures: [0; MAX_PRESSURES],
+            rates: [[0.0; V]; C],
+            offset: [0.0; C],
+            pressures: [0; V],
             pressure_count: 0,
-            pressure_weights: [0.0; MAX_PRESSURES],
+            pressure_weights: [0.0; V],
             pressure_offset: 0.0,
             side: None,
             law: PointLaw::Material,
@@ -89,6 +87,12 @@ impl QuadraturePoint {
             .position(|&c| c == cell)
             .unwrap_or(self.pressure_count);
         if slot == self.pressure_count {
+            if slot == V {
+                // No room for one more, which only a surface torn to shreds asks for: the nearest stands
+                // for it.
+                self.pressure_weights[0] += weight;
+                return;
+            }
             self.pressures[slot] = cell;
             self.pressure_count += 1;
         }
@@ -102,7 +106,7 @@ impl QuadraturePoint {
     }
 
     /// ∂γ_c/∂u for each of [`velocities`](Self::velocities).
-    #[inline]
+    #[cfg(feature = "conic")]
     pub(crate) fn rates(&self, component: usize) -> &[f64] {
         &self.rates[component][..self.velocity_count]
     }
@@ -116,20 +120,34 @@ impl QuadraturePoint {
         )
     }
 
-    /// Strain rate (γ₁, γ₂), walls included.
+    /// Strain rate, walls included.
     #[inline]
-    pub(crate) fn strain_rate(&self, u: &[f64]) -> [f64; COMPONENTS] {
-        let change = self.strain_rate_change(u);
-        [change[0] + self.offset[0], change[1] + self.offset[1]]
+    pub(crate) fn strain_rate(&self, u: &[f64]) -> [f64; C] {
+        let mut rate = self.strain_rate_change(u);
+        for (rate, offset) in rate.iter_mut().zip(self.offset) {
+            *rate += offset;
+        }
+        rate
+    }
+
+    /// Power of a stress per volume by one of the velocities: the force on it.
+    #[inline]
+    pub(crate) fn force(&self, slot: usize, stress: &[f64; C]) -> f64 {
+        let mut force = self.rates[0][slot] * stress[0];
+        for (rates, s) in self.rates[1..].iter().zip(&stress[1..]) {
+            force += rates[slot] * s;
+        }
+        force
     }
 
     /// Strain rate of a change of velocity, to which walls do not contribute.
     #[inline]
-    pub(crate) fn strain_rate_change(&self, u: &[f64]) -> [f64; COMPONENTS] {
-        let mut gamma = [0.0; COMPONENTS];
+    pub(crate) fn strain_rate_change(&self, u: &[f64]) -> [f64; C] {
+        let mut gamma = [0.0; C];
         for (slot, &v) in self.velocities().iter().enumerate() {
-            gamma[0] += self.rates[0][slot] * u[v];
-            gamma[1] += self.rates[1][slot] * u[v];
+            for (gamma, rates) in gamma.iter_mut().zip(&self.rates) {
+                *gamma += rates[slot] * u[v];
+            }
         }
         gamma
     }
@@ -154,9 +172,13 @@ impl QuadraturePoint {
 
 /// The discrete operators of one grid, in units with ρ = 1.
 #[derive(Debug, Clone)]
-pub struct Discretisation {
-    grid: Grid,
-    points: Vec<QuadraturePoint>,
+pub struct Discretisation<
+    const D: usize = DIMENSIONS,
+    const C: usize = COMPONENTS,
+    const V: usize = VELOCITIES,
+> {
+    grid: Grid<D>,
+    points: Vec<QuadraturePoint<C, V>>,
     mass: Vec<f64>,
     /// Component of each velocity.
     components: Vec<usize>,
@@ -166,13 +188,17 @@ pub struct Discretisation {
     boundary_load: Vec<f64>,
     cells: usize,
     /// Places of velocities and then cells, where they are known.
-    places: Vec<Place>,
+    places: Vec<Place<D>>,
 }
 
 /// The parts of [`Discretisation`] that depend on where the material lies.
 #[derive(Debug, Clone, Default)]
-pub(crate) struct Parts {
-    pub points: Vec<QuadraturePoint>,
+pub(crate) struct Parts<
+    const D: usize = DIMENSIONS,
+    const C: usize = COMPONENTS,
+    const V: usize = VELOCITIES,
+> {
+    pub points: Vec<QuadraturePoint<C, V>>,
     pub mass: Vec<f64>,
     pub components: Vec<usize>,
     pub divergence: Vec<(usize, usize, f64)>,
@@ -180,7 +206,7 @@ pub(crate) struct Parts {
     pub boundary_load: Vec<f64>,
     pub cells: usize,
     /// Places of velocities and then cells in half cells; may be left out.
-    pub places: Vec<Place>,
+    pub places: Vec<Place<D>>,
 }
 
 impl Discretisation {
@@ -239,8 +265,36 @@ impl Discretisation {
         Self::of_parts(grid, parts)
     }
 
+    /// Adds the friction of side walls: points that take the velocity for a rate, one for each pair of
+    /// a face across x and one across z of a cell.
+    pub(crate) fn add_side_walls(&mut self, walls: SideWalls) {
+        let grid = &self.grid;
+        let [columns, rows] = [grid.axes()[0].cells(), grid.axes()[1].cells()];
+        let faces_of = |axis: usize, cell: usize| match grid.axes()[axis].faces_of_cell(cell) {
+            None => vec![0],
+            Some(pair) => pair.to_vec(),
+        };
+        for cell in (0..rows).flat_map(|k| (0..columns).map(move |i| [i, k])) {
+            let [xs, zs] = [0, 1].map(|axis| faces_of(axis, cell[axis]));
+            for (&fx, &fz) in xs.iter().flat_map(|x| zs.iter().map(move |z| (x, z))) {
+                let mut point =
+                    QuadraturePoint::new(grid.cell_volume() / (xs.len() * zs.len()) as f64);
+                for (component, face) in [(0, [fx, cell[1]]), (1, [cell[0], fz])] {
+                    if let Some(unknown) = grid.unknown(component, face) {
+                        point.add_velocity(unknown, component, 1.0);
+                    }
+                }
+                point.add_pressure(grid.cell(cell), 1.0);
+                point.law = PointLaw::SideWalls(walls);
+                self.points.push(point);
+            }
+        }
+    }
+}
+
+impl<const D: usize, const C: usize, const V: usize> Discretisation<D, C, V> {
     /// The operators of material that fills part of a grid.
-    pub(crate) fn of_parts(grid: Grid, parts: Parts) -> Self {
+    pub(crate) fn of_parts(grid: Grid<D>, parts: Parts<D, C, V>) -> Self {
         let Parts {
             points,
             mass,
@@ -265,7 +319,7 @@ impl Discretisation {
     }
 
     /// Places of all unknowns in half cells, where they are known.
-    pub(crate) fn places(&self) -> Option<&[Place]> {
+    pub(crate) fn places(&self) -> Option<&[Place<D>]> {
         (!self.places.is_empty()).then_some(self.places.as_slice())
     }
 
@@ -294,17 +348,17 @@ impl Discretisation {
     }
 
     /// The grid.
-    pub fn grid(&self) -> &Grid {
+    pub fn grid(&self) -> &Grid<D> {
         &self.grid
     }
 
     /// The quadrature points.
-    pub(crate) fn points(&self) -> &[QuadraturePoint] {
+    pub(crate) fn points(&self) -> &[QuadraturePoint<C, V>] {
         &self.points
     }
 
     /// The quadrature points, to be changed.
-    pub(crate) fn points_mut(&mut self) -> &mut [QuadraturePoint] {
+    pub(crate) fn points_mut(&mut self) -> &mut [QuadraturePoint<C, V>] {
         &mut self.points
     }
 
@@ -323,35 +377,9 @@ impl Discretisation {
         &self.divergence
     }
 
-    /// Adds the friction of side walls: points that take the velocity for a rate, one for each pair of
-    /// a face across x and one across z of a cell.
-    pub(crate) fn add_side_walls(&mut self, walls: SideWalls) {
-        let grid = &self.grid;
-        let [columns, rows] = [grid.axes()[0].cells(), grid.axes()[1].cells()];
-        let faces_of = |axis: usize, cell: usize| match grid.axes()[axis].faces_of_cell(cell) {
-            None => vec![0],
-            Some(pair) => pair.to_vec(),
-        };
-        for cell in (0..rows).flat_map(|k| (0..columns).map(move |i| [i, k])) {
-            let [xs, zs] = [0, 1].map(|axis| faces_of(axis, cell[axis]));
-            for (&fx, &fz) in xs.iter().flat_map(|x| zs.iter().map(move |z| (x, z))) {
-                let mut point =
-                    QuadraturePoint::new(grid.cell_volume() / (xs.len() * zs.len()) as f64);
-                for (component, face) in [(0, [fx, cell[1]]), (1, [cell[0], fz])] {
-                    if let Some(unknown) = grid.unknown(component, face) {
-                        point.add_velocity(unknown, component, 1.0);
-                    }
-                }
-                point.add_pressure(grid.cell(cell), 1.0);
-                point.law = PointLaw::SideWalls(walls);
-                self.points.push(point);
-            }
-        }
-    }
-
-    /// Superposes a uniform strain rate (γ₁, γ₂) on that of the unknown velocities, which are then
+    /// Superposes a uniform strain rate on that of the unknown velocities, which are then
     /// those of a disturbance.
-    pub(crate) fn add_uniform_strain_rate(&mut self, rate: [f64; COMPONENTS]) {
+    pub(crate) fn add_uniform_strain_rate(&mut self, rate: [f64; C]) {
         for point in &mut self.points {
             for (offset, rate) in point.offset.iter_mut().zip(rate) {
                 *offset += rate;
@@ -366,7 +394,7 @@ impl Discretisation {
     }
 
     /// Force of a body acceleration and of the pressure outside the grid on each velocity.
-    pub fn load(&self, acceleration: [f64; DIMENSIONS]) -> Vec<f64> {
+    pub fn load(&self, acceleration: [f64; D]) -> Vec<f64> {
         self.boundary_load
             .iter()
             .zip(&self.mass)
@@ -420,7 +448,7 @@ fn push_points(
                 let unknown = grid.unknown(component, face);
                 unknown.map_or(VelocityAt::Zero, VelocityAt::Unknown)
             };
-            add_corner_shear(grid, velocity_at, [fx, fz], &mut point);
+            add_corner_shear(grid, velocity_at, [fx, fz], [0, 1], 1, &mut point);
             match threshold_pressure {
                 ThresholdPressure::Corner => add_corner_pressure(grid, [fx, fz], &mut point),
                 ThresholdPressure::Cell => point.add_pressure(grid.cell(cell), 1.0),
@@ -449,13 +477,17 @@ pub(crate) enum VelocityAt {
     Nowhere,
 }
 
-/// Adds γ₂ = ∂u/∂z + ∂w/∂x at a corner. A rough wall acts through a mirrored velocity outside it;
-/// where a side of the corner cannot hold shear, γ₂ is left at zero and carries no stress.
-pub(crate) fn add_corner_shear(
-    grid: &Grid,
-    velocity_at: impl Fn(usize, [usize; DIMENSIONS]) -> VelocityAt,
-    corner: [usize; DIMENSIONS],
-    point: &mut QuadraturePoint,
+/// Adds γ = ∂u/∂z + ∂w/∂x (for the axes x, z of the `plane`) to component `row` of a point, at the corner
+/// of faces across these axes; along others `corner` is a cell. A rough wall acts through a mirrored
+/// velocity outside it; where a side of the corner cannot hold shear, γ is left at zero and carries no
+/// stress.
+pub(crate) fn add_corner_shear<const D: usize, const C: usize, const V: usize>(
+    grid: &Grid<D>,
+    velocity_at: impl Fn(usize, [usize; D]) -> VelocityAt,
+    corner: [usize; D],
+    plane: [usize; 2],
+    row: usize,
+    point: &mut QuadraturePoint<C, V>,
 ) {
     let axes = grid.axes();
     let smooth = |axis: usize| {
@@ -463,12 +495,11 @@ pub(crate) fn add_corner_shear(
             .boundary_at(corner[axis])
             .is_some_and(|side| side.wall_velocity().is_none())
     };
-    if smooth(0) || smooth(1) {
+    if smooth(plane[0]) || smooth(plane[1]) {
         return;
     }
-    for along in 0..DIMENSIONS {
+    for [along, component] in [[plane[0], plane[1]], [plane[1], plane[0]]] {
         // ∂u_component/∂x_along
-        let component = 1 - along;
         if axes[along] == Axis::Flat {
             continue;
         }
@@ -490,8 +521,11 @@ pub(crate) fn add_corner_shear(
             // The mirrored velocity 2 U − u doubles the difference across half a cell.
             let factor = if wall.is_some() { 2.0 } else { 1.0 };
             if let Some(VelocityAt::Unknown(unknown)) = found {
-                point.add_velocity(unknown, 1, factor * sign * inverse);
-                point.offset[1] -= factor * sign * inverse * wall.unwrap_or(0.0);
+                point.add_velocity(unknown, row, factor * sign * inverse);
+                // A wall moves along the first of its axes.
+                if component == usize::from(along == 0) {
+                    point.offset[row] -= factor * sign * inverse * wall.unwrap_or(0.0);
+                }
             }
         }
     }

@@ -5,8 +5,8 @@
 //! and pressures are unknowns where the material now lies, and solves for velocity, pressure and
 //! stress at once. Cells without material cost next to nothing.
 //!
-//! Axes are looped over by number and planes have three components, so that a third axis is a longer
-//! array; only the corners of quadrature points are written for a plane.
+//! The same code moves material in a plane ([`SurfaceFlow`]) and in space ([`SpaceFlow`]): the number of axes
+//! is a constant of its types. Ground that cuts cells and side walls are known in a plane only.
 
 mod faces;
 mod fields;
@@ -20,5 +20,7 @@ mod transport;
 
 pub use faces::ThinLayer;
 pub use fields::CellFields;
-pub use flow::{Spent, SurfaceFlow, SurfaceOptions, SurfaceState, SurfaceStep};
+pub use flow::{
+    SpaceFlow, SpaceState, Spent, SurfaceFlow, SurfaceOptions, SurfaceState, SurfaceStep,
+};
 pub use ground::{Contact, Terrain};

@@ -1,13 +1,13 @@
 //! The staggered (marker-and-cell) grid: pressure in cells, velocities on faces.
 //!
-//! Axis 0 is x (along the flow), axis 1 is z (across it, upwards). Everything is indexed by axis,
-//! so a third one is a longer array.
+//! Axis 0 is x (along the flow), the last axis is z (across it, upwards); in space y lies between them.
+//! Everything is indexed by axis, so a third one is a longer array.
 
 use crate::error::{Error, require};
 use crate::units::Units;
 use crate::wall_friction::WallFriction;
 
-/// Number of axes of the grid.
+/// Number of axes of a plane grid.
 pub const DIMENSIONS: usize = 2;
 
 /// What holds on one side of a bounded axis.
@@ -160,26 +160,43 @@ impl Axis {
     }
 }
 
+/// The index along each axis of a number that counts with the first axis fastest.
+pub(crate) fn unflatten<const D: usize>(mut number: usize, counts: [usize; D]) -> [usize; D] {
+    counts.map(|count| {
+        let index = number % count;
+        number /= count;
+        index
+    })
+}
+
+/// The number of an index, the first axis counting fastest.
+#[inline]
+pub(crate) fn flatten<const D: usize>(index: [usize; D], counts: [usize; D]) -> usize {
+    (0..D)
+        .rev()
+        .fold(0, |number, axis| number * counts[axis] + index[axis])
+}
+
 /// A staggered grid with its numbering of unknowns.
 ///
 /// Cells are numbered with x running fastest. A velocity is an unknown unless a rigid wall
 /// prescribes it.
 #[derive(Debug, Clone)]
-pub struct Grid {
-    axes: [Axis; DIMENSIONS],
+pub struct Grid<const D: usize = DIMENSIONS> {
+    axes: [Axis; D],
     /// For each component, the number of the unknown on each face (x fastest), if it is one.
-    unknowns: [Vec<Option<usize>>; DIMENSIONS],
-    /// First unknown of each component, and the total.
-    first: [usize; DIMENSIONS + 1],
+    unknowns: [Vec<Option<usize>>; D],
+    /// Unknowns of each component.
+    ranges: [(usize, usize); D],
 }
 
-impl Grid {
+impl<const D: usize> Grid<D> {
     /// Makes the grid.
     ///
     /// # Errors
     /// An axis without cells or without length, or boundaries that leave the pressure
     /// undetermined.
-    pub fn new(axes: [Axis; DIMENSIONS]) -> Result<Self, Error> {
+    pub fn new(axes: [Axis; D]) -> Result<Self, Error> {
         let sets_pressure = axes.iter().any(|axis| match axis {
             Axis::Bounded { low, high, .. } => {
                 low.outer_pressure().is_some() || high.outer_pressure().is_some()
@@ -197,7 +214,7 @@ impl Grid {
     ///
     /// # Errors
     /// An axis without cells or without length.
-    pub fn with_moving_surface(axes: [Axis; DIMENSIONS]) -> Result<Self, Error> {
+    pub fn with_moving_surface(axes: [Axis; D]) -> Result<Self, Error> {
         for axis in &axes {
             require(
                 axis.cells() >= 1,
@@ -222,67 +239,73 @@ impl Grid {
         }
         let mut grid = Self {
             axes,
-            unknowns: Default::default(),
-            first: [0; DIMENSIONS + 1],
+            unknowns: std::array::from_fn(|_| Vec::new()),
+            ranges: [(0, 0); D],
         };
         let mut next = 0;
-        for component in 0..DIMENSIONS {
-            let [nx, nz] = grid.faces(component);
-            let mut table = Vec::with_capacity(nx * nz);
-            for k in 0..nz {
-                for i in 0..nx {
-                    let boundary = grid.axes[component].boundary_at([i, k][component]);
-                    let is_unknown = boundary.is_none_or(|side| side.outer_pressure().is_some());
-                    table.push(is_unknown.then_some(next));
-                    next += usize::from(is_unknown);
-                }
-            }
-            grid.unknowns[component] = table;
-            grid.first[component + 1] = next;
+        for component in 0..D {
+            let counts = grid.faces(component);
+            let first = next;
+            let table = (0..counts.iter().product()).map(|face| {
+                let position = unflatten(face, counts)[component];
+                let boundary = grid.axes[component].boundary_at(position);
+                let is_unknown = boundary.is_none_or(|side| side.outer_pressure().is_some());
+                let number = is_unknown.then_some(next);
+                next += usize::from(is_unknown);
+                number
+            });
+            grid.unknowns[component] = table.collect();
+            grid.ranges[component] = (first, next);
         }
         Ok(grid)
     }
 
-    /// The axes x and z.
-    pub fn axes(&self) -> &[Axis; DIMENSIONS] {
+    /// The axes, z last.
+    pub fn axes(&self) -> &[Axis; D] {
         &self.axes
     }
 
-    /// Number of faces that carry a velocity component, along x and z.
-    pub(crate) fn faces(&self, component: usize) -> [usize; DIMENSIONS] {
-        let mut counts = [self.axes[0].cells(), self.axes[1].cells()];
+    /// Numbers of cells along the axes.
+    pub fn cell_counts(&self) -> [usize; D] {
+        self.axes.map(|axis| axis.cells())
+    }
+
+    /// Number of faces that carry a velocity component, along each axis.
+    pub(crate) fn faces(&self, component: usize) -> [usize; D] {
+        let mut counts = self.cell_counts();
         counts[component] = self.axes[component].faces();
         counts
     }
 
     /// The unknown on a face of a velocity component, `None` where a rigid wall prescribes zero.
-    pub(crate) fn unknown(&self, component: usize, face: [usize; DIMENSIONS]) -> Option<usize> {
-        self.unknowns[component][face[0] + self.faces(component)[0] * face[1]]
+    pub(crate) fn unknown(&self, component: usize, face: [usize; D]) -> Option<usize> {
+        self.unknowns[component][flatten(face, self.faces(component))]
     }
 
     /// The range of unknowns that belong to a velocity component.
     pub fn component(&self, component: usize) -> std::ops::Range<usize> {
-        self.first[component]..self.first[component + 1]
+        let (first, end) = self.ranges[component];
+        first..end
     }
 
     /// Number of unknown velocities.
     pub fn velocities(&self) -> usize {
-        self.first[DIMENSIONS]
+        self.ranges[D - 1].1
     }
 
     /// Number of cells.
     pub fn cells(&self) -> usize {
-        self.axes[0].cells() * self.axes[1].cells()
+        self.axes.iter().map(Axis::cells).product()
     }
 
     /// Number of a cell.
-    pub(crate) fn cell(&self, index: [usize; DIMENSIONS]) -> usize {
-        index[0] + self.axes[0].cells() * index[1]
+    pub(crate) fn cell(&self, index: [usize; D]) -> usize {
+        flatten(index, self.cell_counts())
     }
 
     /// Volume of a cell (per unit length in the directions that are flat or absent).
     pub fn cell_volume(&self) -> f64 {
-        self.axes[0].spacing() * self.axes[1].spacing()
+        self.axes.iter().map(Axis::spacing).product()
     }
 
     /// Area of a face normal to an axis.
@@ -292,7 +315,7 @@ impl Grid {
 
     /// Height of the centre of a row of cells.
     pub fn centre_height(&self, row: usize) -> f64 {
-        (row as f64 + 0.5) * self.axes[1].spacing()
+        (row as f64 + 0.5) * self.axes[D - 1].spacing()
     }
 }
 

@@ -43,6 +43,7 @@
 pub mod bagnold;
 pub mod column;
 pub mod column_collapse;
+pub mod cylinder_collapse;
 pub mod discretisation;
 mod error;
 pub mod flow;
@@ -54,6 +55,7 @@ pub mod linear_solver;
 pub mod plane_shear;
 pub mod plane_wave;
 pub mod rheology;
+pub mod strain;
 pub mod terrain;
 pub mod units;
 pub mod vertical_chute;

@@ -74,11 +74,11 @@ impl SparseSystem {
     ///
     /// # Errors
     /// [`Error::LinearSolver`] if the pattern cannot be analysed.
-    pub fn new(
+    pub fn new<const D: usize>(
         size: usize,
         entries: Vec<Pair>,
         method: Method,
-        places: Option<&[Place]>,
+        places: Option<&[Place<D>]>,
     ) -> Result<(Self, Vec<u32>), Error> {
         let mut pairs = entries;
         let given = pairs.len();
@@ -269,7 +269,8 @@ mod tests {
             [1, 2],
         ];
         let coefficients = [2.0, 1.0, 1.0, 1.0, 1.0, 1.0, 2.0, g];
-        let (mut system, slots) = SparseSystem::new(3, entries.to_vec(), method, None).unwrap();
+        let (mut system, slots) =
+            SparseSystem::new(3, entries.to_vec(), method, None::<&[Place]>).unwrap();
         for (slot, c) in slots.iter().zip(coefficients) {
             system.values_mut()[*slot as usize] += c;
         }

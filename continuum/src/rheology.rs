@@ -66,10 +66,21 @@ pub trait Rheology {
 ///
 /// Two other conventions are in use among codes, √(D:D) and √(½ D:D); they differ by factors √2
 /// and 2, so this is the only place where the norm is formed. The norm of the stress components
-/// ((σ_xx − σ_zz)/2, σ_xz) is the same function.
+/// ((σ_xx − σ_zz)/2, σ_xz) is the same function, and so are those of the five components of a flow in
+/// space ([`crate::strain`]).
 #[inline]
-pub fn strain_rate_norm(components: [f64; 2]) -> f64 {
-    (components[0] * components[0] + components[1] * components[1]).sqrt()
+pub fn strain_rate_norm<const C: usize>(components: [f64; C]) -> f64 {
+    squared_norm(&components).sqrt()
+}
+
+/// γ̇² of the components of a strain rate.
+#[inline]
+pub(crate) fn squared_norm<const C: usize>(components: &[f64; C]) -> f64 {
+    let mut sum = components[0] * components[0];
+    for x in &components[1..] {
+        sum += x * x;
+    }
+    sum
 }
 
 /// What every law has to pass.

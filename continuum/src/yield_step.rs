@@ -27,36 +27,46 @@ pub use regularised::{RegularisedOptions, RegularisedViscosity};
 
 use serde::Serialize;
 
-use crate::discretisation::{COMPONENTS, Discretisation};
+use crate::discretisation::{COMPONENTS, Discretisation, VELOCITIES};
 use crate::error::Error;
+use crate::grid::DIMENSIONS;
 use crate::rheology::Rheology;
 
 /// Velocity, pressure and stress on a grid, in natural units.
 #[derive(Debug, Clone, PartialEq)]
-pub struct FlowState {
+pub struct FlowState<const C: usize = COMPONENTS> {
     /// Unknown velocities, in the grid's numbering.
     pub u: Vec<f64>,
     /// Pressure of each cell, positive in compression.
     pub p: Vec<f64>,
-    /// Stress ((τ_xx − τ_zz)/2, τ_xz) at each quadrature point.
-    pub s: Vec<[f64; COMPONENTS]>,
+    /// Stress at each quadrature point: ((τ_xx − τ_zz)/2, τ_xz) in a plane flow.
+    pub s: Vec<[f64; C]>,
 }
 
-impl FlowState {
+impl<const C: usize> FlowState<C> {
     /// A state at rest with the given pressure in the cells.
-    pub fn at_rest(discretisation: &Discretisation, pressure: Vec<f64>) -> Self {
+    pub fn at_rest<const D: usize, const V: usize>(
+        discretisation: &Discretisation<D, C, V>,
+        pressure: Vec<f64>,
+    ) -> Self {
         Self {
             u: vec![0.0; discretisation.velocities()],
             p: pressure,
-            s: vec![[0.0; COMPONENTS]; discretisation.points().len()],
+            s: vec![[0.0; C]; discretisation.points().len()],
         }
     }
 }
 
 /// What a time step has to solve.
-pub struct StepProblem<'a, R> {
+pub struct StepProblem<
+    'a,
+    R,
+    const D: usize = DIMENSIONS,
+    const C: usize = COMPONENTS,
+    const V: usize = VELOCITIES,
+> {
     /// The discrete operators.
-    pub discretisation: &'a Discretisation,
+    pub discretisation: &'a Discretisation<D, C, V>,
     /// The law of the material, in natural units.
     pub rheology: &'a R,
     /// Force on each velocity.
@@ -92,7 +102,13 @@ pub struct StepReport {
 }
 
 /// A method that makes one implicit time step.
-pub trait YieldSolver<R: Rheology> {
+pub trait YieldSolver<
+    R: Rheology,
+    const D: usize = DIMENSIONS,
+    const C: usize = COMPONENTS,
+    const V: usize = VELOCITIES,
+>
+{
     /// Advances `state`, which is changed only if the report says that the step converged.
     ///
     /// # Errors
@@ -100,8 +116,8 @@ pub trait YieldSolver<R: Rheology> {
     /// error but a report, and the caller cuts the time step.
     fn step(
         &mut self,
-        problem: &StepProblem<'_, R>,
-        state: &mut FlowState,
+        problem: &StepProblem<'_, R, D, C, V>,
+        state: &mut FlowState<C>,
     ) -> Result<StepReport, Error>;
 }
 
@@ -119,10 +135,10 @@ fn threshold_pressure(pressure: f64) -> (f64, bool) {
 }
 
 /// M (u − u*)/Δt + Bᵀ W s − Dᵀ p − F into `residual`, and its largest value per mass.
-fn momentum_residual<R>(
-    problem: &StepProblem<'_, R>,
+fn momentum_residual<R, const D: usize, const C: usize, const V: usize>(
+    problem: &StepProblem<'_, R, D, C, V>,
     u_old: &[f64],
-    state: &FlowState,
+    state: &FlowState<C>,
     residual: &mut [f64],
 ) -> f64 {
     let discretisation = problem.discretisation;
@@ -132,8 +148,7 @@ fn momentum_residual<R>(
     }
     for (point, s) in discretisation.points().iter().zip(&state.s) {
         for (slot, &j) in point.velocities().iter().enumerate() {
-            residual[j] +=
-                point.weight * (point.rates(0)[slot] * s[0] + point.rates(1)[slot] * s[1]);
+            residual[j] += point.weight * point.force(slot, s);
         }
     }
     let forces = discretisation
@@ -150,7 +165,11 @@ fn momentum_residual<R>(
 }
 
 /// D u into `divergence` (integrated over cells), and its largest value per volume.
-fn divergence_residual(discretisation: &Discretisation, u: &[f64], divergence: &mut [f64]) -> f64 {
+fn divergence_residual<const D: usize, const C: usize, const V: usize>(
+    discretisation: &Discretisation<D, C, V>,
+    u: &[f64],
+    divergence: &mut [f64],
+) -> f64 {
     divergence.fill(0.0);
     for &(cell, j, area) in discretisation.divergence() {
         divergence[cell] += area * u[j];

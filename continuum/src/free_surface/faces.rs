@@ -6,6 +6,7 @@
 //! it, so mass and momentum of a step are complete. Material that nothing active touches is
 //! *loose*: it flies.
 
+use super::operators::EMPTY;
 use super::topology::{NONE, Topology};
 use super::transport::{MASSLESS, Velocity};
 use crate::grid::{DIMENSIONS, Grid};
@@ -49,55 +50,66 @@ impl Face {
     }
 }
 
+/// Directions whose merits differ by less than this part are alike.
+pub(super) const ALIKE: f64 = 1e-6;
 /// Cells fuller than this are active.
 pub(crate) const ACTIVE: f64 = 0.5;
 /// Layers thinner than this part of a cell stick to a rough wall.
 pub(super) const THINNEST_LAYER: f64 = 1e-3;
 
 /// Roles of cells and faces.
-#[derive(Debug, Clone, Default)]
-pub(crate) struct Faces {
+#[derive(Debug, Clone)]
+pub(crate) struct Faces<const D: usize = DIMENSIONS> {
     /// Number of the unknown pressure of each cell, or [`NONE`].
     pub pressure: Vec<usize>,
     /// Cells with a pressure.
     pub active: Vec<usize>,
     /// Role of each face of each component.
-    pub role: [Vec<Face>; DIMENSIONS],
+    pub role: [Vec<Face>; D],
     /// Component and face of each unknown velocity.
     pub own: Vec<(usize, usize)>,
     /// Whether an unknown velocity belongs to a thin layer on a wall.
     pub is_thin: Vec<bool>,
     /// Over ground: velocity of each face, and of the edge across it, over the unknown that moves it.
-    pub shares: Option<[Vec<[f64; 2]>; DIMENSIONS]>,
-    pub(super) acceleration: [f64; DIMENSIONS],
+    pub shares: Option<[Vec<[f64; 2]>; D]>,
+    pub(super) acceleration: [f64; D],
 }
 
-impl Faces {
+impl<const D: usize> Faces<D> {
+    /// No roles yet, for so many cells.
+    pub(super) fn empty(cells: usize, acceleration: [f64; D]) -> Self {
+        Self {
+            pressure: vec![NONE; cells],
+            active: Vec::new(),
+            role: std::array::from_fn(|_| Vec::new()),
+            own: Vec::new(),
+            is_thin: Vec::new(),
+            shares: None,
+            acceleration,
+        }
+    }
+
     pub(crate) fn of(
-        grid: &Grid,
-        topology: &Topology,
+        grid: &Grid<D>,
+        topology: &Topology<D>,
         fractions: &[f64],
-        acceleration: [f64; DIMENSIONS],
+        acceleration: [f64; D],
         thin_layer: ThinLayer,
     ) -> Self {
-        let mut faces = Self {
-            acceleration,
-            pressure: vec![NONE; topology.cells()],
-            ..Self::default()
-        };
+        let mut faces = Self::empty(topology.cells(), acceleration);
         for (cell, &fraction) in fractions.iter().enumerate() {
             if fraction > ACTIVE {
                 faces.pressure[cell] = faces.active.len();
                 faces.active.push(cell);
             }
         }
-        for component in 0..DIMENSIONS {
+        for component in 0..D {
             let role = (0..topology.faces(component))
                 .map(|face| faces.own_role(grid, topology, fractions, thin_layer, component, face))
                 .collect();
             faces.role[component] = role;
         }
-        for component in 0..DIMENSIONS {
+        for component in 0..D {
             for face in 0..topology.faces(component) {
                 if faces.role[component][face] == Face::Loose
                     && let Some(host) = faces.host(topology, fractions, component, face)
@@ -112,8 +124,8 @@ impl Faces {
     /// The role of a face by itself; unknowns get their numbers.
     fn own_role(
         &mut self,
-        grid: &Grid,
-        topology: &Topology,
+        grid: &Grid<D>,
+        topology: &Topology<D>,
         fractions: &[f64],
         thin_layer: ThinLayer,
         component: usize,
@@ -145,7 +157,7 @@ impl Faces {
     /// The unknown of the nearest face that has one, the direction into the material first.
     pub(super) fn host(
         &self,
-        topology: &Topology,
+        topology: &Topology<D>,
         fractions: &[f64],
         component: usize,
         face: usize,
@@ -158,18 +170,15 @@ impl Faces {
                 topology.face_mean(component, at, fractions)
             }
         };
-        let mut directions: [(f64, usize, usize); DIMENSIONS] = std::array::from_fn(|axis| {
+        let mut directions: [(f64, usize, usize); D] = std::array::from_fn(|axis| {
             let [low, high] = beside[axis].map(mass);
             ((high - low).abs(), axis, usize::from(high >= low))
         });
         directions.sort_by(|a, b| b.0.total_cmp(&a.0).then(a.1.cmp(&b.1)));
-        let own = |at: usize| match at {
-            NONE => None,
-            at => match self.role[component][at] {
-                Face::Own(j) => Some(j),
-                _ => None,
-            },
-        };
+        if D > 2 {
+            return self.unbiased_host(topology, component, face, directions);
+        }
+        let own = |at: usize| self.own_at(component, at);
         let along = directions.iter().map(|&(_, axis, side)| beside[axis][side]);
         let diagonal = directions
             .iter()
@@ -189,16 +198,96 @@ impl Faces {
         along.chain(diagonal).chain(against).find_map(own)
     }
 
+    /// The same where no direction may be preferred to its mirror image: faces of equal merit are asked
+    /// together, and answer only if one of them alone has an unknown.
+    fn unbiased_host(
+        &self,
+        topology: &Topology<D>,
+        component: usize,
+        face: usize,
+        directions: [(f64, usize, usize); D],
+    ) -> Option<usize> {
+        let step = |at: usize, axis: usize, side: usize| match at {
+            NONE => NONE,
+            at => topology.face_neighbours[component][at][axis][side],
+        };
+        // Number of the first of the directions that are as good.
+        let most = directions[0].0;
+        let mut rank = [0; D];
+        for n in 1..D {
+            let alike = directions[n - 1].0 - directions[n].0 <= ALIKE * most;
+            rank[n] = if alike { rank[n - 1] } else { n };
+        }
+        let level = |n: usize| directions[n].0 <= ALIKE * most;
+        let mut any = None;
+        let mut single = |faces: &mut dyn Iterator<Item = usize>| {
+            let mut found = faces.filter_map(|at| self.own_at(component, at));
+            let first = found.next();
+            any = any.or(first);
+            first.filter(|host| found.all(|other| other == *host))
+        };
+        let towards = |n: usize| step(face, directions[n].1, directions[n].2);
+        let against = |n: usize| step(face, directions[n].1, 1 - directions[n].2);
+        for group in (0..D).filter(|&n| rank[n] == n) {
+            let members = || (0..D).filter(move |&n| rank[n] == group);
+            let host = if level(group) {
+                single(&mut members().flat_map(|n| [towards(n), against(n)]))
+            } else {
+                let pairs = members().flat_map(|n| members().map(move |m| (n, m)));
+                let between = pairs
+                    .filter(|(n, m)| n < m)
+                    .map(|(n, m)| step(towards(n), directions[m].1, directions[m].2));
+                single(&mut members().map(towards)).or_else(|| single(&mut { between }))
+            };
+            if host.is_some() {
+                return host;
+            }
+        }
+        for first in (0..D).filter(|&n| rank[n] == n && !level(n)) {
+            for second in (0..D).filter(|&n| rank[n] == n && n > first && !level(n)) {
+                let pairs = (0..D).filter(|&n| rank[n] == first).flat_map(|n| {
+                    let others = (0..D).filter(move |&m| rank[m] == second);
+                    others.map(move |m| (n, m))
+                });
+                let mut diagonal =
+                    pairs.map(|(n, m)| step(towards(n), directions[m].1, directions[m].2));
+                let host = single(&mut diagonal);
+                if host.is_some() {
+                    return host;
+                }
+            }
+        }
+        for group in (0..D).filter(|&n| rank[n] == n && !level(n)) {
+            let host = single(&mut (0..D).filter(|&n| rank[n] == group).map(against));
+            if host.is_some() {
+                return host;
+            }
+        }
+        // Material must not be lost; what is empty may do without.
+        any.filter(|_| most > 0.0)
+    }
+
+    /// The unknown of a face itself.
+    fn own_at(&self, component: usize, at: usize) -> Option<usize> {
+        match at {
+            NONE => None,
+            at => match self.role[component][at] {
+                Face::Own(j) => Some(j),
+                _ => None,
+            },
+        }
+    }
+
     /// The axis and the side (0 low, 1 high) of a wall along a face that carries the weight of what
     /// lies on it, if there is one.
     pub(crate) fn wall_under(
         &self,
-        grid: &Grid,
-        topology: &Topology,
+        grid: &Grid<D>,
+        topology: &Topology<D>,
         component: usize,
         face: usize,
     ) -> Option<(usize, usize)> {
-        let other = (0..DIMENSIONS).filter(|&axis| axis != component);
+        let other = (0..D).filter(|&axis| axis != component);
         other
             .flat_map(|axis| [(axis, 0), (axis, 1)])
             .find(|&(axis, side)| {
@@ -208,7 +297,12 @@ impl Faces {
                     .boundary_at(edge)
                     .is_some_and(|boundary| boundary.outer_pressure().is_none());
                 let along = self.acceleration[component].abs();
-                ends && rigid && weight_onto(&self.acceleration, axis, side) > along
+                let weight = weight_onto(&self.acceleration, axis, side);
+                // In a corner it is the wall that carries the most.
+                let is_floor = (0..D)
+                    .filter(|&other| other != component)
+                    .all(|other| weight >= self.acceleration[other].abs());
+                ends && rigid && weight > along && is_floor
             })
     }
 
@@ -222,7 +316,7 @@ impl Faces {
     }
 
     /// Gives every face that follows the velocity of its unknown.
-    pub(crate) fn spread(&self, unknowns: &[f64], velocity: &mut Velocity) {
+    pub(crate) fn spread(&self, unknowns: &[f64], velocity: &mut Velocity<D>) {
         if let Some(shares) = &self.shares {
             for ((roles, shares), u) in self.role.iter().zip(shares).zip(velocity) {
                 for ((role, [share, _]), u) in roles.iter().zip(shares).zip(u) {
@@ -250,16 +344,28 @@ impl Faces {
 }
 
 /// Whether a face lies above all material of the cell beside a wall, which cannot fall further.
-fn lies_on_wall(topology: &Topology, fractions: &[f64], component: usize, face: usize) -> bool {
+///
+/// In space dust above does not count.
+fn lies_on_wall<const D: usize>(
+    topology: &Topology<D>,
+    fractions: &[f64],
+    component: usize,
+    face: usize,
+) -> bool {
+    let empty = if D == 2 { 0.0 } else { EMPTY };
     (0..2).any(|side| {
         let cell = topology.face_cells[component][face][side];
         let other = topology.face_cells[component][face][1 - side];
-        topology.cell_neighbours[cell][component][side] == NONE && fractions[other] <= 0.0
+        topology.cell_neighbours[cell][component][side] == NONE && fractions[other] <= empty
     })
 }
 
 /// Gravity normal to a wall on one side of an axis, positive towards the wall.
-pub(crate) fn weight_onto(acceleration: &[f64; DIMENSIONS], axis: usize, side: usize) -> f64 {
+pub(crate) fn weight_onto<const D: usize>(
+    acceleration: &[f64; D],
+    axis: usize,
+    side: usize,
+) -> f64 {
     let towards = if side == 1 { 1.0 } else { -1.0 };
     (towards * acceleration[axis]).max(0.0)
 }

@@ -1,11 +1,12 @@
 //! Fields at the centres of filled cells, for pictures and tables.
 
 use super::flow::SurfaceFlow;
-use super::operators::POINTS;
+use super::operators::points_of;
 use super::topology::NONE;
 use crate::discretisation::COMPONENTS;
-use crate::grid::{Axis, Boundary, DIMENSIONS};
+use crate::grid::{Axis, Boundary, DIMENSIONS, unflatten};
 use crate::rheology::{Rheology, strain_rate_norm};
+use crate::strain::{shear_row, stretching};
 
 /// Matter is rigid where it shears no faster than so many times the strain-rate floor ε.
 const RIGID: f64 = 10.0;
@@ -14,19 +15,20 @@ const EMPTY: f64 = 1e-3;
 
 /// Fields of a cell, in the flow's units.
 #[derive(Debug, Clone, Copy, PartialEq)]
-pub struct CellFields {
+pub struct CellFields<const D: usize = DIMENSIONS, const C: usize = COMPONENTS> {
     /// Lower corner.
-    pub lower: [f64; DIMENSIONS],
+    pub lower: [f64; D],
     /// Upper corner.
-    pub upper: [f64; DIMENSIONS],
+    pub upper: [f64; D],
     /// Share that is filled.
     pub fraction: f64,
     /// Velocity, the mean of opposite faces.
-    pub velocity: [f64; DIMENSIONS],
+    pub velocity: [f64; D],
     /// Pressure; 0 in cells that have none of their own (less than half full).
     pub pressure: f64,
-    /// ((σ_xx − σ_zz)/2, σ_xz), positive in tension, the mean over the filled part.
-    pub stress: [f64; COMPONENTS],
+    /// ((σ_xx − σ_zz)/2, σ_xz), or the five components of [`crate::strain`], positive in tension, the mean
+    /// over the filled part.
+    pub stress: [f64; C],
     /// γ̇ = √(2 D:D), by central differences.
     pub strain_rate: f64,
     /// Whether it flows: γ̇ above ten times the strain-rate floor.
@@ -35,12 +37,12 @@ pub struct CellFields {
     pub well_posed: bool,
 }
 
-impl<R: Rheology> SurfaceFlow<R> {
+impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R, D, C, V> {
     /// Fields of all cells with material, x fastest.
-    pub fn cell_fields(&self) -> Vec<CellFields> {
+    pub fn cell_fields(&self) -> Vec<CellFields<D, C>> {
         let grid = self.grid();
-        let spacing = [0, 1].map(|axis| grid.axes()[axis].spacing());
-        let columns = grid.axes()[0].cells();
+        let spacing = grid.axes().map(|axis| axis.spacing());
+        let points_in_cell = points_of(D);
         let (state, (topology, rheology, floor)) = (self.state(), self.parts());
         let filled = |cell: usize| state.fractions[cell] > EMPTY;
         let faces = |cell: usize, axis: usize| {
@@ -49,13 +51,14 @@ impl<R: Rheology> SurfaceFlow<R> {
                 face => state.velocity[axis][face],
             })
         };
-        let velocity = |cell: usize| [0, 1].map(|axis| 0.5 * faces(cell, axis).iter().sum::<f64>());
+        let velocity = |cell: usize| -> [f64; D] {
+            std::array::from_fn(|axis| 0.5 * faces(cell, axis).iter().sum::<f64>())
+        };
         let mut fields = Vec::new();
         for cell in (0..state.fractions.len()).filter(|&cell| filled(cell)) {
             let own = velocity(cell);
-            // ∂ of the other component along an axis, against neighbours with material or the wall.
-            let shear = |axis: usize| {
-                let component = 1 - axis;
+            // ∂ of a component along another axis, against neighbours with material or the wall.
+            let shear = |component: usize, axis: usize| {
                 let neighbours = topology.cell_neighbours[cell][axis];
                 let walls = match grid.axes()[axis] {
                     Axis::Bounded { low, high, .. } => [Some(low), Some(high)],
@@ -78,22 +81,30 @@ impl<R: Rheology> SurfaceFlow<R> {
                     0.0
                 }
             };
-            let stretch = |axis: usize| {
+            let mut rate = [0.0; C];
+            for axis in 0..D {
                 let [low, high] = faces(cell, axis);
-                (high - low) / spacing[axis]
-            };
-            let strain_rate = strain_rate_norm([stretch(0) - stretch(1), shear(0) + shear(1)]);
+                for &(row, factor) in stretching::<D>(axis) {
+                    rate[row] += factor * (high - low) / spacing[axis];
+                }
+                for lower in 0..axis {
+                    rate[shear_row::<D>(lower, axis)] = shear(axis, lower) + shear(lower, axis);
+                }
+            }
+            let strain_rate = strain_rate_norm(rate);
             let pressure = state.pressure[cell].max(0.0);
             let flows = strain_rate > RIGID * floor;
-            let points = &state.stress[cell * POINTS..(cell + 1) * POINTS];
-            let index = [cell % columns, cell / columns];
+            let points = &state.stress[cell * points_in_cell..(cell + 1) * points_in_cell];
+            let index = unflatten(cell, grid.cell_counts());
             fields.push(CellFields {
-                lower: [0, 1].map(|axis| index[axis] as f64 * spacing[axis]),
-                upper: [0, 1].map(|axis| (index[axis] + 1) as f64 * spacing[axis]),
+                lower: std::array::from_fn(|axis| index[axis] as f64 * spacing[axis]),
+                upper: std::array::from_fn(|axis| (index[axis] + 1) as f64 * spacing[axis]),
                 fraction: state.fractions[cell],
                 velocity: own,
                 pressure,
-                stress: [0, 1].map(|k| points.iter().map(|s| s[k]).sum::<f64>() / POINTS as f64),
+                stress: std::array::from_fn(|k| {
+                    points.iter().map(|s| s[k]).sum::<f64>() / points_in_cell as f64
+                }),
                 strain_rate,
                 flows,
                 well_posed: !flows

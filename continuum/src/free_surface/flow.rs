@@ -12,14 +12,15 @@ use super::fraction::reconstruct;
 use super::ground::contact::sliding_place;
 use super::ground::faces::faces_over;
 use super::ground::{Contact, DUST, Ground, Terrain};
-use super::operators::{Material, Operators, POINTS};
+use super::operators::{Material, Operators, POINTS, points_of};
 use super::plane::Plane;
 use super::topology::{NONE, Topology};
 use super::transport::{MASSLESS, Motion, Transport};
-use crate::discretisation::{COMPONENTS, Discretisation};
+use crate::discretisation::{COMPONENTS, Discretisation, VELOCITIES};
 use crate::error::{Error, require};
 use crate::grid::{Axis, DIMENSIONS, Grid};
 use crate::rheology::Rheology;
+use crate::strain::{SPACE_COMPONENTS, SPACE_VELOCITIES};
 use crate::wall_friction::SideWalls;
 use crate::yield_step::{
     FlowState, PrimalDual, PrimalDualOptions, Residuals, StepProblem, YieldSolver,
@@ -126,17 +127,17 @@ const FIRST_STEP: f64 = 0.2;
 const FULL_TO: f64 = 1e-11;
 
 /// State of a flow with a moving surface, on all of its grid.
-#[derive(Debug, Clone, PartialEq, Default)]
-pub struct SurfaceState {
+#[derive(Debug, Clone, PartialEq)]
+pub struct SurfaceState<const D: usize = DIMENSIONS, const C: usize = COMPONENTS> {
     /// Fraction of each cell that is filled.
     pub fractions: Vec<f64>,
     /// Velocity on each face of each component.
-    pub velocity: [Vec<f64>; DIMENSIONS],
+    pub velocity: [Vec<f64>; D],
     /// Pressure of each cell, negative where there is none.
     pub pressure: Vec<f64>,
     /// Stress at each corner of each cell, then the traction of side walls there if there are any, then
     /// that of ground in each cell under Coulomb friction.
-    pub stress: Vec<[f64; COMPONENTS]>,
+    pub stress: Vec<[f64; C]>,
     /// Time of the fractions.
     pub time: f64,
     /// Time of the velocity, half a step ahead.
@@ -147,23 +148,57 @@ pub struct SurfaceState {
     pub steps: usize,
 }
 
-/// A flow with a moving surface.
-pub struct SurfaceFlow<R> {
-    grid: Grid,
-    topology: Topology,
+impl<const D: usize, const C: usize> Default for SurfaceState<D, C> {
+    fn default() -> Self {
+        Self {
+            fractions: Vec::new(),
+            velocity: std::array::from_fn(|_| Vec::new()),
+            pressure: Vec::new(),
+            stress: Vec::new(),
+            time: 0.0,
+            velocity_time: 0.0,
+            next_step: 0.0,
+            steps: 0,
+        }
+    }
+}
+
+/// Ground, and what follows from it; so far it is known in a plane only.
+struct Bed<const D: usize, const C: usize, const V: usize> {
+    ground: Ground<D>,
+    faces: RolesOver<D>,
+    operators: OperatorsOver<D, C, V>,
+}
+
+/// Makes the roles of faces over ground.
+type RolesOver<const D: usize> =
+    fn(&Ground<D>, &Topology<D>, &[f64], [f64; D], ThinLayer) -> Faces<D>;
+/// Makes the operators of material over ground.
+type OperatorsOver<const D: usize, const C: usize, const V: usize> =
+    for<'a> fn(&Material<'a, D>, &Ground<D>) -> Operators<D, C, V>;
+
+/// A flow with a moving surface, in a plane or in space.
+pub struct SurfaceFlow<
+    R,
+    const D: usize = DIMENSIONS,
+    const C: usize = COMPONENTS,
+    const V: usize = VELOCITIES,
+> {
+    grid: Grid<D>,
+    topology: Topology<D>,
     rheology: R,
-    acceleration: [f64; DIMENSIONS],
+    acceleration: [f64; D],
     options: SurfaceOptions,
-    state: SurfaceState,
-    saved: SurfaceState,
+    state: SurfaceState<D, C>,
+    saved: SurfaceState<D, C>,
     planes: Vec<Option<Plane>>,
-    transport: Transport,
+    transport: Transport<D>,
     side_walls: Option<SideWalls>,
-    ground: Option<Ground>,
+    bed: Option<Bed<D, C, V>>,
     /// Matter and ground together.
     filled: Vec<f64>,
-    solver: Option<(Vec<usize>, PrimalDual)>,
-    unknowns: FlowState,
+    solver: Option<(Vec<usize>, PrimalDual<C>)>,
+    unknowns: FlowState<C>,
     momentum: Vec<f64>,
     divergence: Vec<f64>,
     spent: Spent,
@@ -183,7 +218,7 @@ pub struct Spent {
 }
 
 impl<R: Rheology> SurfaceFlow<R> {
-    /// Material at rest that fills the given fraction of each cell.
+    /// Material at rest that fills the given fraction of each cell of a plane grid, x fastest.
     ///
     /// # Errors
     /// Settings out of range.
@@ -194,38 +229,7 @@ impl<R: Rheology> SurfaceFlow<R> {
         acceleration: [f64; DIMENSIONS],
         options: SurfaceOptions,
     ) -> Result<Self, Error> {
-        options.validate()?;
-        let topology = Topology::new(&grid);
-        let state = SurfaceState {
-            velocity: std::array::from_fn(|c| vec![0.0; topology.faces(c)]),
-            pressure: vec![INACTIVE; topology.cells()],
-            stress: vec![[0.0; COMPONENTS]; topology.cells() * POINTS],
-            fractions,
-            ..SurfaceState::default()
-        };
-        Ok(Self {
-            saved: state.clone(),
-            state,
-            planes: Vec::new(),
-            transport: Transport::default(),
-            side_walls: None,
-            ground: None,
-            filled: Vec::new(),
-            solver: None,
-            unknowns: FlowState {
-                u: Vec::new(),
-                p: Vec::new(),
-                s: Vec::new(),
-            },
-            momentum: Vec::new(),
-            divergence: Vec::new(),
-            spent: Spent::default(),
-            grid,
-            topology,
-            rheology,
-            acceleration,
-            options,
-        })
+        Self::filling(grid, fractions, rheology, acceleration, options)
     }
 
     /// Material at rest over ground, in natural units. Fractions are of whole cells, and at most what the
@@ -260,13 +264,97 @@ impl<R: Rheology> SurfaceFlow<R> {
         flow.topology = topology;
         flow.set_weight_for_pressure();
         flow.saved.clone_from(&flow.state);
-        flow.ground = Some(ground);
+        flow.bed = Some(Bed {
+            ground,
+            faces: faces_over,
+            operators: |material, ground| material.operators_over(ground),
+        });
         Ok(flow)
+    }
+
+    /// The same flow between side walls at a distance along y, in natural units: they rub on what
+    /// moves with 2 c/W + (2 μ/W) p per volume.
+    ///
+    /// # Errors
+    /// Walls out of range.
+    pub fn between_side_walls(mut self, walls: SideWalls) -> Result<Self, Error> {
+        walls.validate()?;
+        self.side_walls = Some(walls);
+        let points = 2 * self.topology.cells() * POINTS;
+        let points = points.max(self.state.stress.len());
+        self.state.stress.resize(points, [0.0; COMPONENTS]);
+        self.saved.clone_from(&self.state);
+        Ok(self)
+    }
+}
+
+/// A flow with a moving surface in space.
+pub type SpaceFlow<R> = SurfaceFlow<R, 3, SPACE_COMPONENTS, SPACE_VELOCITIES>;
+/// The state of a [`SpaceFlow`].
+pub type SpaceState = SurfaceState<3, SPACE_COMPONENTS>;
+
+impl<R: Rheology> SpaceFlow<R> {
+    /// Material at rest that fills the given fraction of each cell of a grid in space, x fastest and z
+    /// slowest.
+    ///
+    /// # Errors
+    /// Settings out of range.
+    pub fn in_space(
+        grid: Grid<3>,
+        fractions: Vec<f64>,
+        rheology: R,
+        acceleration: [f64; 3],
+        options: SurfaceOptions,
+    ) -> Result<Self, Error> {
+        Self::filling(grid, fractions, rheology, acceleration, options)
+    }
+}
+
+impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R, D, C, V> {
+    fn filling(
+        grid: Grid<D>,
+        fractions: Vec<f64>,
+        rheology: R,
+        acceleration: [f64; D],
+        options: SurfaceOptions,
+    ) -> Result<Self, Error> {
+        options.validate()?;
+        let topology = Topology::new(&grid);
+        let state = SurfaceState {
+            velocity: std::array::from_fn(|c| vec![0.0; topology.faces(c)]),
+            pressure: vec![INACTIVE; topology.cells()],
+            stress: vec![[0.0; C]; topology.cells() * points_of(D)],
+            fractions,
+            ..SurfaceState::default()
+        };
+        Ok(Self {
+            saved: state.clone(),
+            state,
+            planes: Vec::new(),
+            transport: Transport::default(),
+            side_walls: None,
+            bed: None,
+            filled: Vec::new(),
+            solver: None,
+            unknowns: FlowState {
+                u: Vec::new(),
+                p: Vec::new(),
+                s: Vec::new(),
+            },
+            momentum: Vec::new(),
+            divergence: Vec::new(),
+            spent: Spent::default(),
+            grid,
+            topology,
+            rheology,
+            acceleration,
+            options,
+        })
     }
 
     /// Starts with the pressure of the weight of what lies above, which is exact under level surfaces.
     fn set_weight_for_pressure(&mut self) {
-        let axis = DIMENSIONS - 1;
+        let axis = D - 1;
         let per_cell = -self.acceleration[axis] * self.grid.axes()[axis].spacing();
         if per_cell <= 0.0 {
             return;
@@ -289,26 +377,11 @@ impl<R: Rheology> SurfaceFlow<R> {
 
     /// Part of each cell that is free of ground.
     pub fn free_parts(&self) -> Option<&[f64]> {
-        self.ground.as_ref().map(|ground| ground.free.as_slice())
-    }
-
-    /// The same flow between side walls at a distance along y, in natural units: they rub on what
-    /// moves with 2 c/W + (2 μ/W) p per volume.
-    ///
-    /// # Errors
-    /// Walls out of range.
-    pub fn between_side_walls(mut self, walls: SideWalls) -> Result<Self, Error> {
-        walls.validate()?;
-        self.side_walls = Some(walls);
-        let points = 2 * self.topology.cells() * POINTS;
-        let points = points.max(self.state.stress.len());
-        self.state.stress.resize(points, [0.0; COMPONENTS]);
-        self.saved.clone_from(&self.state);
-        Ok(self)
+        self.bed.as_ref().map(|bed| bed.ground.free.as_slice())
     }
 
     /// The state.
-    pub fn state(&self) -> &SurfaceState {
+    pub fn state(&self) -> &SurfaceState<D, C> {
         &self.state
     }
 
@@ -316,12 +389,12 @@ impl<R: Rheology> SurfaceFlow<R> {
     ///
     /// # Errors
     /// [`Error::ForeignState`] if the state belongs to another grid.
-    pub fn set_state(&mut self, state: SurfaceState) -> Result<(), Error> {
+    pub fn set_state(&mut self, state: SurfaceState<D, C>) -> Result<(), Error> {
         let cells = self.topology.cells();
         let fits = state.fractions.len() == cells
             && state.pressure.len() == cells
             && state.stress.len() == self.state.stress.len()
-            && (0..DIMENSIONS).all(|c| state.velocity[c].len() == self.topology.faces(c));
+            && (0..D).all(|c| state.velocity[c].len() == self.topology.faces(c));
         if !fits {
             return Err(Error::ForeignState {
                 found: state.fractions.len(),
@@ -338,12 +411,12 @@ impl<R: Rheology> SurfaceFlow<R> {
     }
 
     /// The grid.
-    pub fn grid(&self) -> &Grid {
+    pub fn grid(&self) -> &Grid<D> {
         &self.grid
     }
 
     /// What fields are made from besides the state: neighbours, law, strain-rate floor.
-    pub(super) fn parts(&self) -> (&Topology, &R, f64) {
+    pub(super) fn parts(&self) -> (&Topology<D>, &R, f64) {
         let floor = self.options.solver.strain_rate_floor;
         (&self.topology, &self.rheology, floor)
     }
@@ -354,7 +427,7 @@ impl<R: Rheology> SurfaceFlow<R> {
     }
 
     /// Momentum of the material.
-    pub fn momentum(&self) -> [f64; DIMENSIONS] {
+    pub fn momentum(&self) -> [f64; D] {
         std::array::from_fn(|c| {
             let faces = self.state.velocity[c].iter().enumerate();
             faces
@@ -385,7 +458,7 @@ impl<R: Rheology> SurfaceFlow<R> {
                 continue;
             }
             let mut rate = 0.0;
-            for axis in 0..DIMENSIONS {
+            for axis in 0..D {
                 let faces = self.topology.cell_faces[cell][axis];
                 if faces.contains(&NONE) {
                     continue;
@@ -508,16 +581,24 @@ impl<R: Rheology> SurfaceFlow<R> {
     fn transport(&mut self, dt: f64) {
         let clock = std::time::Instant::now();
         let axes = self.grid.axes();
-        let mut order: Vec<usize> = (0..DIMENSIONS).filter(|&a| axes[a] != Axis::Flat).collect();
-        if !self.state.steps.is_multiple_of(2) {
-            order.reverse();
+        let mut orders = vec![(0..D).collect::<Vec<usize>>()];
+        if D > 2 {
+            // Neither of the horizontal axes comes first.
+            orders.push([1, 0].into_iter().chain(2..D).collect());
         }
+        for order in &mut orders {
+            order.retain(|&axis| axes[axis] != Axis::Flat);
+            if !self.state.steps.is_multiple_of(2) {
+                order.reverse();
+            }
+        }
+        orders.dedup();
         let incompressible: Vec<bool> = (0..self.topology.cells())
-            .map(|cell| match &self.ground {
+            .map(|cell| match &self.bed {
                 None => {
                     self.state.fractions[cell] > ACTIVE && self.divergence(cell).abs() < DILATES
                 }
-                Some(ground) => {
+                Some(Bed { ground, .. }) => {
                     let fraction = self.state.fractions[cell];
                     fraction > ACTIVE * ground.free[cell]
                         && self.divergence_over(ground, cell).abs() < DILATES
@@ -530,9 +611,9 @@ impl<R: Rheology> SurfaceFlow<R> {
                 topology: &self.topology,
                 passes: passes as usize,
                 courant: std::array::from_fn(|axis| dt / (passes * axes[axis].spacing())),
-                order: &order,
+                orders: &orders,
                 incompressible: &incompressible,
-                ground: self.ground.as_ref(),
+                ground: self.bed.as_ref().map(|bed| &bed.ground),
             },
             &mut self.state.fractions,
             &mut self.state.velocity,
@@ -542,7 +623,7 @@ impl<R: Rheology> SurfaceFlow<R> {
 
     fn divergence(&self, cell: usize) -> f64 {
         let mut sum = 0.0;
-        for axis in 0..DIMENSIONS {
+        for axis in 0..D {
             let [low, high] = self.topology.cell_faces[cell][axis];
             if low != NONE {
                 let u = &self.state.velocity[axis];
@@ -553,14 +634,14 @@ impl<R: Rheology> SurfaceFlow<R> {
     }
 
     /// Flux out of the cells that share a pressure with one, per volume of a whole cell.
-    fn divergence_over(&self, ground: &Ground, cell: usize) -> f64 {
+    fn divergence_over(&self, ground: &Ground<D>, cell: usize) -> f64 {
         let master = match ground.master[cell] {
             NONE => return 0.0,
             master => master,
         };
         let mut sum = 0.0;
         for member in std::iter::once(master).chain(ground.parts_of(master)) {
-            for axis in 0..DIMENSIONS {
+            for axis in 0..D {
                 let [low, high] = self.topology.cell_faces[member][axis];
                 let through =
                     |face: usize| self.state.velocity[axis][face] * ground.aperture[axis][face];
@@ -575,7 +656,7 @@ impl<R: Rheology> SurfaceFlow<R> {
         let clock = std::time::Instant::now();
         let fractions = &self.state.fractions;
         let (acceleration, thin_layer) = (self.acceleration, self.options.thin_layer);
-        let faces = match &self.ground {
+        let faces = match &self.bed {
             None => {
                 reconstruct(&self.topology, fractions, &mut self.planes);
                 Faces::of(
@@ -586,7 +667,7 @@ impl<R: Rheology> SurfaceFlow<R> {
                     thin_layer,
                 )
             }
-            Some(ground) => {
+            Some(Bed { ground, faces, .. }) => {
                 ground.fill(fractions, &mut self.filled);
                 reconstruct(&self.topology, &self.filled, &mut self.planes);
                 // Nor has the surface of matter a plane where there is only ground.
@@ -595,7 +676,7 @@ impl<R: Rheology> SurfaceFlow<R> {
                         *plane = None;
                     }
                 }
-                faces_over(ground, &self.topology, fractions, acceleration, thin_layer)
+                faces(ground, &self.topology, fractions, acceleration, thin_layer)
             }
         };
         let material = Material {
@@ -610,9 +691,9 @@ impl<R: Rheology> SurfaceFlow<R> {
         let Operators {
             discretisation,
             places,
-        } = match &self.ground {
+        } = match &self.bed {
             None => material.operators(),
-            Some(ground) => material.operators_over(ground),
+            Some(bed) => (bed.operators)(&material, &bed.ground),
         };
         self.gather(&faces, &places);
         if self.falls_freely(&discretisation, dt) {
@@ -660,11 +741,11 @@ impl<R: Rheology> SurfaceFlow<R> {
 
     /// Without pressure and stress, and if gravity alone lets no cell shrink, free fall is the exact
     /// solution: makes it, to the last bit, and says so.
-    fn falls_freely(&mut self, discretisation: &Discretisation, dt: f64) -> bool {
+    fn falls_freely(&mut self, discretisation: &Discretisation<D, C, V>, dt: f64) -> bool {
         let unknowns = &mut self.unknowns;
-        let is_loose = self.ground.is_none()
+        let is_loose = self.bed.is_none()
             && unknowns.p.iter().all(|p| *p <= f64::MIN_POSITIVE)
-            && unknowns.s.iter().all(|s| *s == [0.0; COMPONENTS])
+            && unknowns.s.iter().all(|s| *s == [0.0; C])
             && self.rheology.threshold(1.0, 0.0).stress == 0.0
             && self
                 .side_walls
@@ -691,13 +772,13 @@ impl<R: Rheology> SurfaceFlow<R> {
     }
 
     /// Velocity, pressure and stress of the unknowns from those of the grid.
-    fn gather(&mut self, faces: &Faces, places: &[usize]) {
+    fn gather(&mut self, faces: &Faces<D>, places: &[usize]) {
         let count = faces.own.len();
         self.unknowns.u.clear();
         self.unknowns.u.resize(count, 0.0);
         self.momentum.clear();
         self.momentum.resize(count, 0.0);
-        for c in 0..DIMENSIONS {
+        for c in 0..D {
             for (face, role) in faces.role[c].iter().enumerate() {
                 if let Some(j) = role.unknown() {
                     let mass = self.topology.face_mean(c, face, &self.state.fractions);
@@ -726,8 +807,8 @@ impl<R: Rheology> SurfaceFlow<R> {
             .extend(places.iter().map(|&place| self.state.stress[place]));
     }
 
-    fn scatter(&mut self, faces: &Faces, places: &[usize], dt: f64) {
-        for c in 0..DIMENSIONS {
+    fn scatter(&mut self, faces: &Faces<D>, places: &[usize], dt: f64) {
+        for c in 0..D {
             let push = self.acceleration[c] * dt;
             for (face, role) in faces.role[c].iter().enumerate() {
                 let mass = self.topology.face_mean(c, face, &self.state.fractions);
@@ -743,7 +824,7 @@ impl<R: Rheology> SurfaceFlow<R> {
             self.state.pressure[cell] = *p;
         }
 
-        self.state.stress.fill([0.0; COMPONENTS]);
+        self.state.stress.fill([0.0; C]);
         for (&place, s) in places.iter().zip(&self.unknowns.s) {
             self.state.stress[place] = *s;
         }
@@ -751,8 +832,8 @@ impl<R: Rheology> SurfaceFlow<R> {
 
     /// Height of material in each column of cells along the last axis.
     pub fn heights(&self) -> Vec<f64> {
-        let columns = self.grid.axes()[0].cells();
-        let spacing = self.grid.axes()[DIMENSIONS - 1].spacing();
+        let columns = self.grid.cell_counts()[..D - 1].iter().product();
+        let spacing = self.grid.axes()[D - 1].spacing();
         let mut heights = vec![0.0; columns];
         for row in self.state.fractions.chunks_exact(columns) {
             for (height, fraction) in heights.iter_mut().zip(row) {

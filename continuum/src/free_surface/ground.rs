@@ -82,7 +82,7 @@ const NEAREST: f64 = 1e-3;
 
 /// How ground cuts the cells and faces of a grid.
 #[derive(Debug, Clone)]
-pub(crate) struct Ground {
+pub(crate) struct Ground<const D: usize = DIMENSIONS> {
     pub contact: Contact,
     /// Part of each cell that is free of ground.
     pub free: Vec<f64>,
@@ -93,19 +93,19 @@ pub(crate) struct Ground {
     /// Free part of each quarter of a cell, in cells.
     pub quarters: Vec<[f64; POINTS]>,
     /// Free part of each face.
-    pub aperture: [Vec<f64>; DIMENSIONS],
+    pub aperture: [Vec<f64>; D],
     /// Free part of the edge across each face.
-    pub edge: [Vec<f64>; DIMENSIONS],
+    pub edge: [Vec<f64>; D],
     /// Distances of face and edge from the ground.
-    distance: [Vec<[f64; 2]>; DIMENSIONS],
+    distance: [Vec<[f64; 2]>; D],
     /// Whether a face may have an unknown.
-    pub open: [Vec<bool>; DIMENSIONS],
+    pub open: [Vec<bool>; D],
     /// The cell whose pressure a cell has; [`NONE`] in ground.
     pub master: Vec<usize>,
     /// Cells that belong to the pressure of each cell besides itself.
     pub parts: Vec<(usize, usize)>,
     /// ∫ n dA of the ground's surface in each cell, out of the ground.
-    pub wall: Vec<[f64; DIMENSIONS]>,
+    pub wall: Vec<[f64; D]>,
 }
 
 /// Halves of the faces and of the lines through the middles of cells that are free.
@@ -182,6 +182,29 @@ fn centre_of(halves: [f64; 2]) -> f64 {
         more if more.abs() < 1e-12 => 0.5,
         more if more > 0.0 => 0.5 * part,
         _ => 1.0 - 0.5 * part,
+    }
+}
+
+impl<const D: usize> Ground<D> {
+    /// Matter and ground together in each cell, without dust.
+    pub(crate) fn fill(&self, fractions: &[f64], filled: &mut Vec<f64>) {
+        filled.clear();
+        filled.extend(fractions.iter().zip(&self.solid).map(|(fraction, solid)| {
+            if *fraction > DUST {
+                fraction + solid
+            } else {
+                *solid
+            }
+        }));
+    }
+
+    /// The other cells that share the pressure of a cell.
+    pub(crate) fn parts_of(&self, cell: usize) -> impl Iterator<Item = usize> + '_ {
+        let first = self.parts.partition_point(|&(master, _)| master < cell);
+        self.parts[first..]
+            .iter()
+            .take_while(move |&&(master, _)| master == cell)
+            .map(|&(_, part)| part)
     }
 }
 
@@ -377,27 +400,6 @@ impl Ground {
             }
         }
         self.parts.sort_unstable();
-    }
-
-    /// Matter and ground together in each cell, without dust.
-    pub(crate) fn fill(&self, fractions: &[f64], filled: &mut Vec<f64>) {
-        filled.clear();
-        filled.extend(fractions.iter().zip(&self.solid).map(|(fraction, solid)| {
-            if *fraction > DUST {
-                fraction + solid
-            } else {
-                *solid
-            }
-        }));
-    }
-
-    /// The other cells that share the pressure of a cell.
-    pub(crate) fn parts_of(&self, cell: usize) -> impl Iterator<Item = usize> + '_ {
-        let first = self.parts.partition_point(|&(master, _)| master < cell);
-        self.parts[first..]
-            .iter()
-            .take_while(move |&&(master, _)| master == cell)
-            .map(|&(_, part)| part)
     }
 
     /// Whether ground touches a face's surroundings, so that its velocity depends on its distance.

@@ -7,13 +7,16 @@
 //! to round-off. Quadrature points have the volume of material in their quarter of a cell, so what
 //! lies outside bears nothing and the surface is free of stress.
 
-use super::faces::{ACTIVE, Face, Faces, weight_onto};
+use super::faces::{ACTIVE, ALIKE, Face, Faces, weight_onto};
 use super::fraction::volume_in;
 use super::plane::Plane;
 use super::topology::{NONE, Topology};
-use crate::discretisation::{Discretisation, Parts, QuadraturePoint, VelocityAt, add_corner_shear};
-use crate::grid::{Axis, DIMENSIONS, Grid};
+use crate::discretisation::{
+    COMPONENTS, Discretisation, Parts, QuadraturePoint, VELOCITIES, VelocityAt, add_corner_shear,
+};
+use crate::grid::{Axis, DIMENSIONS, Grid, flatten, unflatten};
 use crate::linear_solver::Place;
+use crate::strain::{shear_row, stretching};
 use crate::wall_friction::{PointLaw, SideWalls};
 
 /// Smallest θ in the pressure gradient and in the pressure at walls.
@@ -23,30 +26,39 @@ pub(super) const NEAREST_EXTRAPOLATION: f64 = 0.25;
 /// Cells with less material have no quadrature points.
 pub(super) const EMPTY: f64 = 1e-9;
 /// Most quadrature points of a cell: fewer along flat axes.
-pub(crate) const POINTS: usize = 1 << DIMENSIONS;
+pub(crate) const POINTS: usize = points_of(DIMENSIONS);
+
+/// Most quadrature points of a cell with so many axes.
+pub(crate) const fn points_of(axes: usize) -> usize {
+    1 << axes
+}
 
 /// Material on a grid: what the operators are made from.
-pub(crate) struct Material<'a> {
-    pub grid: &'a Grid,
-    pub topology: &'a Topology,
+pub(crate) struct Material<'a, const D: usize = DIMENSIONS> {
+    pub grid: &'a Grid<D>,
+    pub topology: &'a Topology<D>,
     pub fractions: &'a [f64],
     pub planes: &'a [Option<Plane>],
-    pub faces: &'a Faces,
+    pub faces: &'a Faces<D>,
     /// Walls beside the plane, which rub.
     pub side_walls: Option<SideWalls>,
     /// Acceleration by gravity.
-    pub acceleration: [f64; DIMENSIONS],
+    pub acceleration: [f64; D],
 }
 
-/// The operators, and the place of each quadrature point on the grid: cell times [`POINTS`] plus
+/// The operators, and the place of each quadrature point on the grid: cell times [`points_of`] plus
 /// corner, and the points of side walls after those of all cells.
-pub(crate) struct Operators {
-    pub discretisation: Discretisation,
+pub(crate) struct Operators<
+    const D: usize = DIMENSIONS,
+    const C: usize = COMPONENTS,
+    const V: usize = VELOCITIES,
+> {
+    pub discretisation: Discretisation<D, C, V>,
     pub places: Vec<usize>,
 }
 
-impl Material<'_> {
-    pub(crate) fn operators(&self) -> Operators {
+impl<const D: usize> Material<'_, D> {
+    pub(crate) fn operators<const C: usize, const V: usize>(&self) -> Operators<D, C, V> {
         let mut parts = Parts {
             mass: self.masses(),
             components: self.faces.own.iter().map(|&(c, _)| c).collect(),
@@ -70,19 +82,16 @@ impl Material<'_> {
     }
 
     /// Where the unknowns are, in half cells.
-    pub(super) fn places(&self) -> Vec<Place> {
+    pub(super) fn places(&self) -> Vec<Place<D>> {
         let velocities = self.faces.own.iter().map(|&(component, face)| {
-            let width = self.grid.faces(component)[0];
-            let mut place = [2 * (face % width) as u32, 2 * (face / width) as u32];
-            place[1 - component] += 1;
+            let mut place = unflatten(face, self.grid.faces(component)).map(|i| 2 * i as u32 + 1);
+            place[component] -= 1;
             place
         });
-        let width = self.grid.axes()[0].cells();
+        let counts = self.grid.cell_counts();
         let cells = self.faces.active.iter();
-        let cells = cells.map(|cell| [(cell % width) as u32, (cell / width) as u32]);
-        velocities
-            .chain(cells.map(|index| index.map(|i| 2 * i + 1)))
-            .collect()
+        let cells = cells.map(|&cell| unflatten(cell, counts).map(|i| 2 * i as u32 + 1));
+        velocities.chain(cells).collect()
     }
 
     /// Mass of each unknown, followers included.
@@ -99,6 +108,12 @@ impl Material<'_> {
         mass
     }
 
+    /// The surface in a cell. In space dust has none: where some of it lies is a matter of round-off.
+    fn plane(&self, cell: usize) -> Option<&Plane> {
+        let plane = self.planes[cell].as_ref();
+        plane.filter(|_| D == 2 || self.fractions[cell] > EMPTY)
+    }
+
     /// Distance θ, in cells, from the centre of an active cell to the surface on the way to its
     /// inactive neighbour along an axis.
     pub(super) fn surface_distance(
@@ -108,11 +123,11 @@ impl Material<'_> {
         axis: usize,
         side: usize,
     ) -> f64 {
-        let mut step = [0.0; DIMENSIONS];
+        let mut step = [0.0; D];
         step[axis] = if side == 1 { 1.0 } else { -1.0 };
         let back = step.map(|s| -s);
-        let here = [0.0; DIMENSIONS];
-        let (inner, outer) = match (&self.planes[active], &self.planes[other]) {
+        let here = [0.0; D];
+        let (inner, outer) = match (self.plane(active), self.plane(other)) {
             (Some(a), Some(b)) => (depth_of_centre(a, here), depth_of_centre(b, here)),
             (Some(a), None) => (depth_of_centre(a, here), depth_of_centre(a, step)),
             (None, Some(b)) => (depth_of_centre(b, back), depth_of_centre(b, here)),
@@ -128,9 +143,9 @@ impl Material<'_> {
     }
 
     /// Divergence of active cells, and the force of their pressure.
-    fn add_pressure_forces(&self, parts: &mut Parts) {
+    fn add_pressure_forces<const C: usize, const V: usize>(&self, parts: &mut Parts<D, C, V>) {
         for (p, &cell) in self.faces.active.iter().enumerate() {
-            for axis in 0..DIMENSIONS {
+            for axis in 0..D {
                 for side in 0..2 {
                     let face = self.topology.cell_faces[cell][axis][side];
                     if face == NONE {
@@ -159,7 +174,7 @@ impl Material<'_> {
     }
 
     /// Force of the slope of their own surface on the velocities of thin layers.
-    fn add_thin_layers(&self, parts: &mut Parts) {
+    fn add_thin_layers<const C: usize, const V: usize>(&self, parts: &mut Parts<D, C, V>) {
         for (j, &(component, face)) in self.faces.own.iter().enumerate() {
             if !self.faces.is_thin[j] {
                 continue;
@@ -178,8 +193,8 @@ impl Material<'_> {
     }
 
     /// The velocity on a face, as an operator at a point sees it.
-    fn velocity_at(&self, component: usize, index: [usize; DIMENSIONS]) -> VelocityAt {
-        let face = index[0] + self.grid.faces(component)[0] * index[1];
+    fn velocity_at(&self, component: usize, index: [usize; D]) -> VelocityAt {
+        let face = flatten(index, self.grid.faces(component));
         match self.faces.role[component][face] {
             Face::Own(j) | Face::Follows(j) => VelocityAt::Unknown(j),
             Face::Slides(_) | Face::Still => VelocityAt::Zero,
@@ -188,27 +203,26 @@ impl Material<'_> {
     }
 
     /// Adds the quadrature points of one cell, one for each corner.
-    fn add_points(&self, cell: usize, points: &mut Vec<QuadraturePoint>, places: &mut Vec<usize>) {
-        let nx = self.grid.axes()[0].cells();
-        let index = [cell % nx, cell / nx];
-        let sides = |axis: usize| {
-            if self.grid.axes()[axis] == Axis::Flat {
-                1
-            } else {
-                2
-            }
-        };
-        for (corner, side) in (0..sides(1))
-            .flat_map(|k| (0..sides(0)).map(move |i| [i, k]))
-            .enumerate()
-        {
+    fn add_points<const C: usize, const V: usize>(
+        &self,
+        cell: usize,
+        points: &mut Vec<QuadraturePoint<C, V>>,
+        places: &mut Vec<usize>,
+    ) {
+        let axes = self.grid.axes();
+        let index = unflatten(cell, self.grid.cell_counts());
+        let sides = axes.map(|axis| if axis == Axis::Flat { 1 } else { 2 });
+        let corners: usize = sides.iter().product();
+        let share = 1.0 / corners as f64;
+        for corner in 0..corners {
+            let side = unflatten(corner, sides);
             let (mut low, mut high) = ([0.0; 3], [1.0; 3]);
             let mut at = index;
-            for axis in 0..DIMENSIONS {
-                if sides(axis) == 2 {
+            for axis in 0..D {
+                if sides[axis] == 2 {
                     low[axis] = 0.5 * side[axis] as f64;
                     high[axis] = low[axis] + 0.5;
-                    if let Some(pair) = self.grid.axes()[axis].faces_of_cell(index[axis]) {
+                    if let Some(pair) = axes[axis].faces_of_cell(index[axis]) {
                         at[axis] = pair[side[axis]];
                     }
                 }
@@ -217,10 +231,9 @@ impl Material<'_> {
                 let filled = volume_in(self.fractions[cell], self.planes[cell].as_ref(), low, high);
                 if let Some(point) = self.rubbing(walls, cell, side, filled) {
                     points.push(point);
-                    places.push((self.fractions.len() + cell) * POINTS + corner);
+                    places.push((self.fractions.len() + cell) * points_of(D) + corner);
                 }
             }
-            let share = 1.0 / (sides(0) * sides(1)) as f64;
             let volume = match self.wall_share(at) {
                 Some(factor) => factor * share,
                 None => volume_in(self.fractions[cell], self.planes[cell].as_ref(), low, high),
@@ -229,35 +242,43 @@ impl Material<'_> {
                 continue;
             }
             let mut point = QuadraturePoint::new(volume * self.grid.cell_volume());
-            for (axis, orientation) in [(0, 1.0), (1, -1.0)] {
-                self.add_stretching(cell, axis, orientation, &mut point);
+            for axis in 0..D {
+                for &(row, orientation) in stretching::<D>(axis) {
+                    self.add_stretching(cell, axis, row, orientation, &mut point);
+                }
             }
-            add_corner_shear(
-                self.grid,
-                |c, face| self.velocity_at(c, face),
-                at,
-                &mut point,
-            );
+            for high in 1..D {
+                for low in 0..high {
+                    // The edge through the corner: a cell along the other axes.
+                    let mut edge = index;
+                    edge[low] = at[low];
+                    edge[high] = at[high];
+                    let row = shear_row::<D>(low, high);
+                    let velocity_at = |c, face| self.velocity_at(c, face);
+                    add_corner_shear(self.grid, velocity_at, edge, [low, high], row, &mut point);
+                }
+            }
             self.add_corner_pressure(at, &mut point);
             if !point.velocities().is_empty() {
-                point.side = self.grid.axes()[1]
-                    .boundary_at(at[1])
-                    .map(|_| usize::from(at[1] > 0));
+                let last = D - 1;
+                point.side = axes[last]
+                    .boundary_at(at[last])
+                    .map(|_| usize::from(at[last] > 0));
                 points.push(point);
-                places.push(cell * POINTS + corner);
+                places.push(cell * points_of(D) + corner);
             }
         }
     }
 
     /// The friction of side walls on a quarter of a cell, whose velocity is that of the two faces
     /// beside it. A layer too thin for a pressure presses against them with half its weight.
-    fn rubbing(
+    fn rubbing<const C: usize, const V: usize>(
         &self,
         walls: SideWalls,
         cell: usize,
-        side: [usize; DIMENSIONS],
+        side: [usize; D],
         volume: f64,
-    ) -> Option<QuadraturePoint> {
+    ) -> Option<QuadraturePoint<C, V>> {
         let mut point = QuadraturePoint::new(volume * self.grid.cell_volume());
         point.law = PointLaw::SideWalls(walls);
         for (component, side) in side.into_iter().enumerate() {
@@ -273,12 +294,13 @@ impl Material<'_> {
         if self.faces.pressure[cell] != NONE {
             point.add_pressure(self.faces.pressure[cell], 1.0);
         } else {
-            let (axis, side) = (0..DIMENSIONS)
-                .flat_map(|axis| [(axis, 0), (axis, 1)])
-                .find(|&(axis, side)| {
-                    self.topology.cell_neighbours[cell][axis][side] == NONE
-                        && weight_onto(&self.acceleration, axis, side) > 0.0
-                })?;
+            let (axis, side) =
+                (0..D)
+                    .flat_map(|axis| [(axis, 0), (axis, 1)])
+                    .find(|&(axis, side)| {
+                        self.topology.cell_neighbours[cell][axis][side] == NONE
+                            && weight_onto(&self.acceleration, axis, side) > 0.0
+                    })?;
             let thickness = self.fractions[cell] * self.grid.axes()[axis].spacing();
             point.pressure_offset = 0.5 * thickness * weight_onto(&self.acceleration, axis, side);
         }
@@ -288,43 +310,44 @@ impl Material<'_> {
     /// At a corner on a rough wall the traction acts on the whole face, however thin the layer:
     /// the factor by which the points there count, so that they do as long as one of the cells
     /// holds material.
-    fn wall_share(&self, corner: [usize; DIMENSIONS]) -> Option<f64> {
+    fn wall_share(&self, corner: [usize; D]) -> Option<f64> {
         let axes = self.grid.axes();
-        let rough = (0..DIMENSIONS).any(|axis| {
+        let rough = (0..D).any(|axis| {
             axes[axis]
                 .boundary_at(corner[axis])
                 .is_some_and(|side| side.wall_velocity().is_some())
         });
-        let cells = self.cells_at_corner(corner);
-        let all = cells.iter().flatten().count();
-        let filled = cells
-            .iter()
-            .flatten()
-            .filter(|&&cell| self.fractions[cell] > EMPTY)
-            .count();
+        let (mut all, mut filled) = (0, 0);
+        for cell in self.cells_at_corner(corner) {
+            all += 1;
+            filled += usize::from(self.fractions[cell] > EMPTY);
+        }
         (rough && filled > 0).then(|| all as f64 / filled as f64)
     }
 
-    fn cells_at_corner(&self, corner: [usize; DIMENSIONS]) -> [Option<usize>; 4] {
+    /// The cells around a corner that lie on the grid, x fastest; along a flat axis twice the same.
+    fn cells_at_corner(&self, corner: [usize; D]) -> impl Iterator<Item = usize> + '_ {
         let axes = self.grid.axes();
-        let xs = axes[0].cells_at_face(corner[0]);
-        let zs = axes[1].cells_at_face(corner[1]);
-        let cell = |x: Option<usize>, z: Option<usize>| Some(self.grid.cell([x?, z?]));
-        [
-            cell(xs[0], zs[0]),
-            cell(xs[1], zs[0]),
-            cell(xs[0], zs[1]),
-            cell(xs[1], zs[1]),
-        ]
+        let around: [[Option<usize>; 2]; D] =
+            std::array::from_fn(|axis| axes[axis].cells_at_face(corner[axis]));
+        (0..points_of(D)).filter_map(move |nth| {
+            let mut index = [0; D];
+            for (axis, index) in index.iter_mut().enumerate() {
+                *index = around[axis][nth >> axis & 1]?;
+            }
+            Some(self.grid.cell(index))
+        })
     }
 
-    /// Adds the stretching of a cell along an axis to γ₁, if both of its faces move.
-    fn add_stretching(
+    /// Adds the stretching of a cell along an axis to a component of the strain rate, if both of its faces
+    /// move.
+    fn add_stretching<const C: usize, const V: usize>(
         &self,
         cell: usize,
         axis: usize,
+        row: usize,
         orientation: f64,
-        point: &mut QuadraturePoint,
+        point: &mut QuadraturePoint<C, V>,
     ) {
         let faces = self.topology.cell_faces[cell][axis];
         if faces.contains(&NONE) {
@@ -337,7 +360,7 @@ impl Material<'_> {
         let inverse = 1.0 / self.grid.axes()[axis].spacing();
         for (role, sign) in roles.into_iter().zip([-1.0, 1.0]) {
             if let Some(j) = role.unknown() {
-                point.add_velocity(j, 0, orientation * sign * inverse);
+                point.add_velocity(j, row, orientation * sign * inverse);
             }
         }
     }
@@ -348,47 +371,81 @@ impl Material<'_> {
         if self.faces.pressure[cell] != NONE {
             return Some((self.faces.pressure[cell], 1.0));
         }
-        let mut best: Option<(f64, usize, f64)> = None;
-        for axis in 0..DIMENSIONS {
-            for side in 0..2 {
-                let inner = self.topology.cell_neighbours[cell][axis][side];
-                if inner == NONE || self.faces.pressure[inner] == NONE {
-                    continue;
-                }
-                let level = self.planes[cell]
-                    .as_ref()
-                    .or(self.planes[inner].as_ref())
-                    .map_or(1.0, |plane| {
-                        plane.normal[axis] * if side == 1 { -1.0 } else { 1.0 }
-                    });
-                if best.is_none_or(|(most, _, _)| level > most) {
-                    let distance = self
-                        .surface_distance(inner, cell, axis, 1 - side)
-                        .max(nearest);
-                    best = Some((
-                        level,
-                        self.faces.pressure[inner],
-                        (distance - 1.0) / distance,
-                    ));
-                }
+        self.ways_inside(cell)
+            .reduce(|best, way| if way.0 > best.0 { way } else { best })
+            .map(|way| self.extrapolated(cell, way, nearest))
+    }
+
+    /// Ways from a cell to active ones beside it: how level the surface is across each, axis and side.
+    fn ways_inside(&self, cell: usize) -> impl Iterator<Item = (f64, usize, usize)> + '_ {
+        let ways = (0..D).flat_map(|axis| [(axis, 0), (axis, 1)]);
+        ways.filter_map(move |(axis, side)| {
+            let inner = self.topology.cell_neighbours[cell][axis][side];
+            if inner == NONE || self.faces.pressure[inner] == NONE {
+                return None;
             }
+            let plane = self.plane(cell).or(self.plane(inner));
+            let level = plane.map_or(1.0, |plane| {
+                plane.normal[axis] * if side == 1 { -1.0 } else { 1.0 }
+            });
+            Some((level, axis, side))
+        })
+    }
+
+    /// The pressure of the active cell along a way, continued through p = 0 at the surface.
+    fn extrapolated(
+        &self,
+        cell: usize,
+        (_, axis, side): (f64, usize, usize),
+        nearest: f64,
+    ) -> (usize, f64) {
+        let inner = self.topology.cell_neighbours[cell][axis][side];
+        let distance = self
+            .surface_distance(inner, cell, axis, 1 - side)
+            .max(nearest);
+        (self.faces.pressure[inner], (distance - 1.0) / distance)
+    }
+
+    /// The same pressure where two ways may be alike, as on the diagonal of what mirrors itself there: the
+    /// mean of both.
+    fn pressures_at(&self, cell: usize, nearest: f64) -> [Option<(usize, f64)>; 2] {
+        let one = self.pressure_at(cell, nearest);
+        if D == 2 || self.faces.pressure[cell] != NONE {
+            return [one, None];
         }
-        best.map(|(_, p, factor)| (p, factor))
+        let most = self.ways_inside(cell).map(|way| way.0).fold(0.0, f64::max);
+        let mut alike = self
+            .ways_inside(cell)
+            .filter(|way| most - way.0 <= ALIKE * most);
+        match (alike.next(), alike.next(), alike.next()) {
+            (Some(a), Some(b), None) => [a, b].map(|way| {
+                let (p, factor) = self.extrapolated(cell, way, nearest);
+                Some((p, 0.5 * factor))
+            }),
+            _ => [one, None],
+        }
     }
 
     /// Adds the linear interpolation of pressure to a corner. On a wall it is extrapolated from the
     /// two cells above it; under a thin layer it is the layer's weight.
-    fn add_corner_pressure(&self, corner: [usize; DIMENSIONS], point: &mut QuadraturePoint) {
+    fn add_corner_pressure<const C: usize, const V: usize>(
+        &self,
+        corner: [usize; D],
+        point: &mut QuadraturePoint<C, V>,
+    ) {
         let axes = self.grid.axes();
-        let wall = (0..DIMENSIONS)
+        let wall = (0..D)
             .rev()
             .find(|&axis| axes[axis].boundary_at(corner[axis]).is_some());
-        let cells = self.cells_at_corner(corner);
-        let count = cells.iter().flatten().count() as f64;
-        for cell in cells.into_iter().flatten() {
+        let count = self.cells_at_corner(corner).count() as f64;
+        for cell in self.cells_at_corner(corner) {
             let share = 1.0 / count;
             let Some(axis) = wall else {
-                if let Some((p, factor)) = self.pressure_at(cell, NEAREST_EXTRAPOLATION) {
+                for (p, factor) in self
+                    .pressures_at(cell, NEAREST_EXTRAPOLATION)
+                    .into_iter()
+                    .flatten()
+                {
                     point.add_pressure(p, share * factor);
                 }
                 continue;
@@ -419,7 +476,7 @@ impl Material<'_> {
 }
 
 /// Depth below a plane, in cells, of the centre of the cell that lies so many steps from its own.
-fn depth_of_centre(plane: &Plane, steps: [f64; DIMENSIONS]) -> f64 {
+fn depth_of_centre<const D: usize>(plane: &Plane, steps: [f64; D]) -> f64 {
     let mut point = [0.5; 3];
     for (x, step) in point.iter_mut().zip(steps) {
         *x += step;

@@ -1,6 +1,6 @@
 //! Who touches whom on a staggered grid: tables that loops run over instead of recomputing indices.
 
-use crate::grid::{Axis, DIMENSIONS, Grid};
+use crate::grid::{Axis, DIMENSIONS, Grid, flatten, unflatten};
 
 /// What stands for a neighbour beyond the edge of the grid.
 pub(crate) const NONE: usize = usize::MAX;
@@ -8,29 +8,15 @@ pub(crate) const NONE: usize = usize::MAX;
 /// Neighbourhoods of the cells and faces of one grid. Faces of a component are numbered with x
 /// running fastest, boundary faces included.
 #[derive(Debug, Clone)]
-pub(crate) struct Topology {
+pub(crate) struct Topology<const D: usize = DIMENSIONS> {
     /// For each cell and axis, the faces below and above; none on a flat axis.
-    pub cell_faces: Vec<[[usize; 2]; DIMENSIONS]>,
+    pub cell_faces: Vec<[[usize; 2]; D]>,
     /// For each cell and axis, the cells below and above.
-    pub cell_neighbours: Vec<[[usize; 2]; DIMENSIONS]>,
+    pub cell_neighbours: Vec<[[usize; 2]; D]>,
     /// For each component and face, the cells on both sides; the same one twice on a flat axis.
-    pub face_cells: [Vec<[usize; 2]>; DIMENSIONS],
+    pub face_cells: [Vec<[usize; 2]>; D],
     /// For each component, face and axis, the faces of the same component below and above.
-    pub face_neighbours: [Vec<[[usize; 2]; DIMENSIONS]>; DIMENSIONS],
-}
-
-fn unflatten(mut number: usize, counts: [usize; DIMENSIONS]) -> [usize; DIMENSIONS] {
-    counts.map(|count| {
-        let index = number % count;
-        number /= count;
-        index
-    })
-}
-
-fn flatten(index: [usize; DIMENSIONS], counts: [usize; DIMENSIONS]) -> usize {
-    (0..DIMENSIONS)
-        .rev()
-        .fold(0, |number, axis| number * counts[axis] + index[axis])
+    pub face_neighbours: [Vec<[[usize; 2]; D]>; D],
 }
 
 /// Positions below and above one along an axis with `count` positions.
@@ -48,16 +34,16 @@ fn beside(axis: &Axis, position: usize, count: usize) -> [Option<usize>; 2] {
     }
 }
 
-impl Topology {
-    pub(crate) fn new(grid: &Grid) -> Self {
+impl<const D: usize> Topology<D> {
+    pub(crate) fn new(grid: &Grid<D>) -> Self {
         Self::rising(grid, 0)
     }
 
     /// A grid whose periodic axis x meets itself so many cells higher up. Rows close on themselves
     /// for it, the lowest below the highest: ground below and room above keep them apart.
-    pub(crate) fn rising(grid: &Grid, rise: usize) -> Self {
+    pub(crate) fn rising(grid: &Grid<D>, rise: usize) -> Self {
         let axes = grid.axes();
-        let cells: [usize; DIMENSIONS] = std::array::from_fn(|axis| axes[axis].cells());
+        let cells: [usize; D] = std::array::from_fn(|axis| axes[axis].cells());
         // A step along x beyond an end of the period, and the row that it leads to.
         let shifted = |row: usize, from: usize, to: usize, count: usize, rows: usize| {
             let is_over = rise > 0 && count > 2;
@@ -69,20 +55,20 @@ impl Topology {
                 row
             }
         };
-        let replaced = |index: [usize; DIMENSIONS],
-                        axis: usize,
-                        position: Option<usize>,
-                        counts: [usize; DIMENSIONS]| {
-            position.map_or(NONE, |position| {
-                let mut index = index;
-                if axis == 0 {
-                    index[1] = shifted(index[1], index[0], position, counts[0], counts[1]);
-                }
-                index[axis] = position;
-                flatten(index, counts)
-            })
-        };
-        let all_beside = |index: [usize; DIMENSIONS], counts: [usize; DIMENSIONS]| {
+        let replaced =
+            |index: [usize; D], axis: usize, position: Option<usize>, counts: [usize; D]| {
+                position.map_or(NONE, |position| {
+                    let mut index = index;
+                    if axis == 0 {
+                        let last = D - 1;
+                        index[last] =
+                            shifted(index[last], index[0], position, counts[0], counts[last]);
+                    }
+                    index[axis] = position;
+                    flatten(index, counts)
+                })
+            };
+        let all_beside = |index: [usize; D], counts: [usize; D]| {
             std::array::from_fn(|axis| {
                 beside(&axes[axis], index[axis], counts[axis])
                     .map(|position| replaced(index, axis, position, counts))

@@ -20,12 +20,15 @@ use crate::grid::DIMENSIONS;
 /// A velocity whose mass is below this fraction of a cell has no momentum of its own.
 pub(crate) const MASSLESS: f64 = 1e-12;
 
+/// Less of a cell than this is nothing, far below the round-off of what surrounds it.
+const NOTHING: f64 = 1e-20;
+
 /// Velocities on all faces, component by component.
-pub(crate) type Velocity = [Vec<f64>; DIMENSIONS];
+pub(crate) type Velocity<const D: usize = DIMENSIONS> = [Vec<f64>; D];
 
 /// Work arrays of the transport on one grid.
-#[derive(Debug, Default)]
-pub(crate) struct Transport {
+#[derive(Debug)]
+pub(crate) struct Transport<const D: usize = DIMENSIONS> {
     planes: Vec<Option<Plane>>,
     /// Volume through each face of the axis of the sweep, in cell volumes.
     fluxes: Vec<f64>,
@@ -36,27 +39,31 @@ pub(crate) struct Transport {
     next: Vec<f64>,
     /// Matter and ground together.
     filled: Vec<f64>,
-    start: Velocity,
+    start: Velocity<D>,
     /// Momentum of each velocity of a component.
     momentum: Vec<f64>,
+    /// Fractions and velocities before a part that is made in several orders.
+    before: (Vec<f64>, Velocity<D>),
+    /// Fractions and momenta, their mean over the orders.
+    mean: (Vec<f64>, Velocity<D>),
 }
 
 /// What moves, and how fast.
-pub(crate) struct Motion<'a> {
-    pub topology: &'a Topology,
+pub(crate) struct Motion<'a, const D: usize = DIMENSIONS> {
+    pub topology: &'a Topology<D>,
     /// Parts of the step, each of which moves material with the same velocity.
     pub passes: usize,
     /// Δt of a part over the cell size along each axis.
-    pub courant: [f64; DIMENSIONS],
-    /// Axes to sweep over, in this order.
-    pub order: &'a [usize],
+    pub courant: [f64; D],
+    /// Axes to sweep over, in this order; of several orders the mean is taken.
+    pub orders: &'a [Vec<usize>],
     /// Cells without divergence.
     pub incompressible: &'a [bool],
     /// Ground that cuts cells and faces.
-    pub ground: Option<&'a Ground>,
+    pub ground: Option<&'a Ground<D>>,
 }
 
-impl Motion<'_> {
+impl<const D: usize> Motion<'_, D> {
     /// Whether more than half of what is free of a cell is filled.
     fn is_active(&self, cell: usize, fraction: f64) -> bool {
         match self.ground {
@@ -66,21 +73,92 @@ impl Motion<'_> {
     }
 }
 
-impl Transport {
+impl<const D: usize> Default for Transport<D> {
+    fn default() -> Self {
+        let components = || std::array::from_fn(|_| Vec::new());
+        Self {
+            planes: Vec::new(),
+            fluxes: Vec::new(),
+            dilatation: Vec::new(),
+            total_dilatation: Vec::new(),
+            dilates: Vec::new(),
+            next: Vec::new(),
+            filled: Vec::new(),
+            start: components(),
+            momentum: Vec::new(),
+            before: (Vec::new(), components()),
+            mean: (Vec::new(), components()),
+        }
+    }
+}
+
+impl<const D: usize> Transport<D> {
     /// Moves material and momentum; walls let nothing through.
     pub(crate) fn advance(
         &mut self,
-        motion: &Motion<'_>,
+        motion: &Motion<'_, D>,
         fractions: &mut Vec<f64>,
-        velocity: &mut Velocity,
+        velocity: &mut Velocity<D>,
     ) {
         self.start.clone_from(velocity);
         for _ in 0..motion.passes {
-            self.pass(motion, fractions, velocity);
+            match motion.orders {
+                [order] => self.pass(motion, order, fractions, velocity),
+                orders => self.mean_pass(motion, orders, fractions, velocity),
+            }
         }
     }
 
-    fn pass(&mut self, motion: &Motion<'_>, fractions: &mut Vec<f64>, velocity: &mut Velocity) {
+    /// The mean of volume and momentum over several orders of the sweeps.
+    fn mean_pass(
+        &mut self,
+        motion: &Motion<'_, D>,
+        orders: &[Vec<usize>],
+        fractions: &mut Vec<f64>,
+        velocity: &mut Velocity<D>,
+    ) {
+        let topology = motion.topology;
+        let nothing = || (Vec::new(), std::array::from_fn(|_| Vec::new()));
+        let mut before = std::mem::replace(&mut self.before, nothing());
+        let mut mean = std::mem::replace(&mut self.mean, nothing());
+        before.0.clone_from(fractions);
+        before.1.clone_from(velocity);
+        let share = 1.0 / orders.len() as f64;
+        for (nth, order) in orders.iter().enumerate() {
+            if nth > 0 {
+                fractions.clone_from(&before.0);
+                velocity.clone_from(&before.1);
+            }
+            self.pass(motion, order, fractions, velocity);
+            add_share(&mut mean.0, nth == 0, fractions.iter().map(|f| share * f));
+            for (c, (mean, u)) in mean.1.iter_mut().zip(velocity.iter()).enumerate() {
+                let momenta = u.iter().enumerate();
+                let momenta = momenta.map(|(face, u)| topology.face_mean(c, face, fractions) * u);
+                add_share(mean, nth == 0, momenta.map(|m| share * m));
+            }
+        }
+        fractions.clone_from(&mean.0);
+        for (c, u) in velocity.iter_mut().enumerate() {
+            for (face, u) in u.iter_mut().enumerate() {
+                let mass = topology.face_mean(c, face, fractions);
+                *u = if mass > MASSLESS && !topology.is_edge(c, face) {
+                    mean.1[c][face] / mass
+                } else {
+                    before.1[c][face]
+                };
+            }
+        }
+        self.before = before;
+        self.mean = mean;
+    }
+
+    fn pass(
+        &mut self,
+        motion: &Motion<'_, D>,
+        order: &[usize],
+        fractions: &mut Vec<f64>,
+        velocity: &mut Velocity<D>,
+    ) {
         self.total_dilatation.clear();
         self.total_dilatation.resize(fractions.len(), 0.0);
         self.dilates.clear();
@@ -88,7 +166,7 @@ impl Transport {
         self.dilates.extend(
             full.map(|(cell, (f, incompressible))| *incompressible && motion.is_active(cell, *f)),
         );
-        for (nth, &axis) in motion.order.iter().enumerate() {
+        for (nth, &axis) in order.iter().enumerate() {
             match motion.ground {
                 None => {
                     reconstruct(motion.topology, fractions, &mut self.planes);
@@ -100,8 +178,8 @@ impl Transport {
                     self.volume_fluxes_over(motion, ground, fractions, axis);
                 }
             }
-            self.update_fractions(motion, fractions, axis, nth + 1 == motion.order.len());
-            for component in 0..DIMENSIONS {
+            self.update_fractions(motion, fractions, axis, nth + 1 == order.len());
+            for component in 0..D {
                 self.move_momentum(motion, fractions, velocity, axis, component);
             }
             std::mem::swap(fractions, &mut self.next);
@@ -114,8 +192,8 @@ impl Transport {
     /// Volume through the free parts of faces.
     fn volume_fluxes_over(
         &mut self,
-        motion: &Motion<'_>,
-        ground: &Ground,
+        motion: &Motion<'_, D>,
+        ground: &Ground<D>,
         fractions: &[f64],
         axis: usize,
     ) {
@@ -144,7 +222,7 @@ impl Transport {
         self.fluxes.extend((0..topology.faces(axis)).map(flux));
     }
 
-    fn volume_fluxes(&mut self, motion: &Motion<'_>, fractions: &[f64], axis: usize) {
+    fn volume_fluxes(&mut self, motion: &Motion<'_, D>, fractions: &[f64], axis: usize) {
         let (planes, start) = (&self.planes, &self.start[axis]);
         self.fluxes.clear();
         self.fluxes
@@ -173,7 +251,7 @@ impl Transport {
 
     fn update_fractions(
         &mut self,
-        motion: &Motion<'_>,
+        motion: &Motion<'_, D>,
         fractions: &[f64],
         axis: usize,
         is_last: bool,
@@ -197,17 +275,21 @@ impl Transport {
             };
             self.total_dilatation[cell] += dilatation;
             self.dilatation.push(dilatation);
-            self.next
-                .push(fraction - (self.fluxes[high] - self.fluxes[low]) + dilatation);
+            let mut next = fraction - (self.fluxes[high] - self.fluxes[low]) + dilatation;
+            // In space dust gets everywhere, and thinner with every step.
+            if D > 2 && next.abs() < NOTHING {
+                next = 0.0;
+            }
+            self.next.push(next);
         }
     }
 
     /// Moves the momentum of one component in the sweep along `axis`.
     fn move_momentum(
         &mut self,
-        motion: &Motion<'_>,
+        motion: &Motion<'_, D>,
         fractions: &[f64],
-        velocity: &mut Velocity,
+        velocity: &mut Velocity<D>,
         axis: usize,
         component: usize,
     ) {
@@ -277,6 +359,18 @@ impl Transport {
     }
 }
 
+/// Begins or goes on with a sum of values.
+fn add_share(sums: &mut Vec<f64>, is_first: bool, values: impl Iterator<Item = f64>) {
+    if is_first {
+        sums.clear();
+        sums.extend(values);
+    } else {
+        for (sum, value) in sums.iter_mut().zip(values) {
+            *sum += value;
+        }
+    }
+}
+
 /// Slope between two differences, of the smaller curvature and never beyond either neighbour
 /// (monotonised central, van Leer, *J. Comput. Phys.* 23 (1977) 276).
 fn limited(left: f64, right: f64) -> f64 {
@@ -290,5 +384,7 @@ fn limited(left: f64, right: f64) -> f64 {
     size * left.signum()
 }
 
+#[cfg(test)]
+mod space_tests;
 #[cfg(test)]
 mod tests;

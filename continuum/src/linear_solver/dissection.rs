@@ -1,23 +1,25 @@
 //! Nested dissection (George, *SIAM J. Numer. Anal.* 10 (1973) 345) of unknowns on a staggered grid, by
 //! their places.
 //!
-//! The velocities are cut in two by a strip that no coefficient of the plane operators reaches across: a
-//! column of cells with both of its columns of faces. Each half is cut again, and the strip is
+//! The velocities are cut in two by a strip that no coefficient reaches across: a column (in
+//! space, a layer) of cells with both of its columns of faces. Each half is cut again, and the strip is
 //! eliminated last. Pressures go before all velocities: what they leave behind, the product of two
 //! rows of the divergence, couples the faces of one cell, which the strain rate couples anyway, so they
 //! cost no fill and make no strip wider. The factors are as small as those in a minimum-degree order,
 //! which would have to be found anew whenever the surface enters a cell and took a fifth of the time of a
 //! step.
 
+use crate::grid::DIMENSIONS;
+
 /// Place of an unknown in half cells along each axis: cells at odd numbers, faces at even ones.
-pub type Place = [u32; 2];
+pub type Place<const D: usize = DIMENSIONS> = [u32; D];
 
 /// Pieces of fewer unknowns are not cut.
 const SMALLEST_PIECE: usize = 12;
 
 /// The unknowns in the order in which they are eliminated; those from number `definite` on are
 /// pressures.
-pub(super) fn dissect(places: &[Place], definite: usize) -> Vec<usize> {
+pub(super) fn dissect<const D: usize>(places: &[Place<D>], definite: usize) -> Vec<usize> {
     let pressures = places.len() - definite;
     let mut order: Vec<usize> = (definite..places.len()).chain(0..definite).collect();
     let mut work = Dissection {
@@ -29,8 +31,8 @@ pub(super) fn dissect(places: &[Place], definite: usize) -> Vec<usize> {
     order
 }
 
-struct Dissection<'a> {
-    places: &'a [Place],
+struct Dissection<'a, const D: usize> {
+    places: &'a [Place<D>],
     sorted: Vec<usize>,
     counts: Vec<usize>,
 }
@@ -43,12 +45,12 @@ struct Cut {
     strip: usize,
 }
 
-impl Dissection<'_> {
+impl<const D: usize> Dissection<'_, D> {
     fn cut(&mut self, piece: &mut [usize]) {
         if piece.len() < SMALLEST_PIECE {
             return;
         }
-        let cuts = [0, 1].map(|axis| self.middle(piece, axis));
+        let cuts: [Option<Cut>; D] = std::array::from_fn(|axis| self.middle(piece, axis));
         let best = cuts.into_iter().flatten().min_by_key(|cut| cut.strip);
         let Some(cut) = best else { return };
         let places = self.places;

@@ -2,7 +2,7 @@
 //! K = M/Δt + Bᵀ W C B and G = Bᵀ W g P, where C (2 × 2) and g (2) live at quadrature points and P
 //! interpolates pressure to them.
 
-use crate::discretisation::{COMPONENTS, Discretisation};
+use crate::discretisation::Discretisation;
 use crate::error::Error;
 use crate::grid::Axis;
 use crate::linear_solver::{LOOSE, Method, SparseSystem};
@@ -25,7 +25,10 @@ pub(super) struct StepMatrix {
 impl StepMatrix {
     /// The matrix of one grid, to be solved to a relative residual `tolerance` where it is solved
     /// iteratively.
-    pub(super) fn new(discretisation: &Discretisation, tolerance: f64) -> Result<Self, Error> {
+    pub(super) fn new<const D: usize, const C: usize, const V: usize>(
+        discretisation: &Discretisation<D, C, V>,
+        tolerance: f64,
+    ) -> Result<Self, Error> {
         let velocities = discretisation.velocities();
         let size = velocities + discretisation.cells();
         let mut entries = Vec::with_capacity(size + MOST_PAIRS * discretisation.points().len());
@@ -60,12 +63,12 @@ impl StepMatrix {
 
     /// Fills the matrix; `law` gives C and g at each point. Where a cell is released its pressure
     /// is zero and its divergence free.
-    pub(super) fn fill(
+    pub(super) fn fill<const D: usize, const C: usize, const V: usize>(
         &mut self,
-        discretisation: &Discretisation,
+        discretisation: &Discretisation<D, C, V>,
         dt: f64,
         released: &[bool],
-        law: impl Fn(usize) -> ([[f64; COMPONENTS]; COMPONENTS], [f64; COMPONENTS]),
+        law: impl Fn(usize) -> ([[f64; C]; C], [f64; C]),
     ) {
         let values = self.system.values_mut();
         values.fill(0.0);
@@ -89,18 +92,17 @@ impl StepMatrix {
         let mut slots = self.points.iter();
         for (q, point) in discretisation.points().iter().enumerate() {
             let (c, g) = law(q);
-            let (b1, b2) = (point.rates(0), point.rates(1));
+            let velocities = point.velocities().len();
             let pressure_weights = point.pressures().1;
-            for row in 0..b1.len() {
+            // C is symmetric.
+            for row in 0..velocities {
                 // Row of Bᵀ W C, then of Bᵀ W g.
-                let left = [
-                    point.weight * (b1[row] * c[0][0] + b2[row] * c[1][0]),
-                    point.weight * (b1[row] * c[0][1] + b2[row] * c[1][1]),
-                ];
-                for (column, &slot) in (0..b1.len()).zip(slots.by_ref()) {
-                    values[slot as usize] += left[0] * b1[column] + left[1] * b2[column];
+                let left: [f64; C] =
+                    std::array::from_fn(|a| point.weight * point.force(row, &c[a]));
+                for (column, &slot) in (0..velocities).zip(slots.by_ref()) {
+                    values[slot as usize] += point.force(column, &left);
                 }
-                let by_pressure = point.weight * (b1[row] * g[0] + b2[row] * g[1]);
+                let by_pressure = point.weight * point.force(row, &g);
                 for (weight, &slot) in pressure_weights.iter().zip(slots.by_ref()) {
                     values[slot as usize] += by_pressure * weight;
                 }
@@ -117,9 +119,13 @@ const PRESSURE_REGULARISATION: f64 = 1e-5;
 const SMALL_REGULARISATION: f64 = 1e-8;
 
 /// Flows along one axis have narrow bands and are solved directly.
-fn method_for(discretisation: &Discretisation, tolerance: f64) -> Method {
+fn method_for<const D: usize, const C: usize, const V: usize>(
+    discretisation: &Discretisation<D, C, V>,
+    tolerance: f64,
+) -> Method {
     let grid = discretisation.grid();
-    if grid.axes().contains(&Axis::Flat) {
+    let axes = grid.axes().iter();
+    if axes.filter(|axis| **axis != Axis::Flat).count() <= 1 {
         Method::Direct
     } else {
         let share = if tolerance < LOOSE {

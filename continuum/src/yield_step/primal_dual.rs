@@ -15,7 +15,7 @@ use super::{
 };
 use crate::discretisation::{COMPONENTS, Discretisation, QuadraturePoint};
 use crate::error::Error;
-use crate::rheology::{Rheology, strain_rate_norm};
+use crate::rheology::{Rheology, squared_norm, strain_rate_norm};
 
 /// Settings of [`PrimalDual`]; times and lengths in natural units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -40,6 +40,10 @@ pub struct PrimalDualOptions {
     /// Factor by which the tolerances of momentum and stress are raised at a speed of √(g H), and in
     /// proportion below (never under 1).
     pub tolerance_in_motion: f64,
+    /// Relative residual to which the linear system of an iteration is solved where it is solved
+    /// iteratively. A tighter one than the default saves no iteration; it leaves less of what the order of
+    /// elimination does to a flow that mirrors itself.
+    pub linear_tolerance: f64,
     /// Whether pressure is one-sided: p ≥ 0 and ∇·u ≥ 0, one of them zero, so that matter that is
     /// pulled apart falls freely instead of being held by suction.
     pub one_sided_pressure: bool,
@@ -56,6 +60,7 @@ impl Default for PrimalDualOptions {
             divergence_tolerance: 1e-9,
             stress_tolerance: 1e-8,
             tolerance_in_motion: 1.0,
+            linear_tolerance: NEWTON_TOLERANCE,
             one_sided_pressure: false,
         }
     }
@@ -72,14 +77,24 @@ const WARM_ITERATIONS: usize = 12;
 const NEWTON_TOLERANCE: f64 = 1e-3;
 
 /// The law linearised at one quadrature point.
-#[derive(Debug, Clone, Copy, Default)]
-struct LinearisedPoint {
+#[derive(Debug, Clone, Copy)]
+struct LinearisedPoint<const C: usize> {
     /// κ γ/√(|γ|² + ε²): the stress that the law asks for now.
-    stress: [f64; COMPONENTS],
+    stress: [f64; C],
     /// ∂s/∂γ as the stress update uses it.
-    by_rate: [[f64; COMPONENTS]; COMPONENTS],
+    by_rate: [[f64; C]; C],
     /// ∂s/∂p.
-    by_pressure: [f64; COMPONENTS],
+    by_pressure: [f64; C],
+}
+
+impl<const C: usize> Default for LinearisedPoint<C> {
+    fn default() -> Self {
+        Self {
+            stress: [0.0; C],
+            by_rate: [[0.0; C]; C],
+            by_pressure: [0.0; C],
+        }
+    }
 }
 
 /// How an attempt begins and descends.
@@ -91,11 +106,11 @@ struct Strategy {
 }
 
 /// The default solver of time steps. It holds the matrix and the work arrays of one grid.
-pub struct PrimalDual {
+pub struct PrimalDual<const C: usize = COMPONENTS> {
     options: PrimalDualOptions,
     matrix: StepMatrix,
-    trial: FlowState,
-    points: Vec<LinearisedPoint>,
+    trial: FlowState<C>,
+    points: Vec<LinearisedPoint<C>>,
     /// Cells without pressure that may dilate.
     released: Vec<bool>,
     right_hand_side: Vec<f64>,
@@ -104,12 +119,15 @@ pub struct PrimalDual {
     candidate_pressure: Vec<f64>,
 }
 
-impl PrimalDual {
+impl<const C: usize> PrimalDual<C> {
     /// Analyses the grid's matrix and sets the work arrays up.
     ///
     /// # Errors
     /// Options out of range, or a pattern that cannot be analysed.
-    pub fn new(discretisation: &Discretisation, options: PrimalDualOptions) -> Result<Self, Error> {
+    pub fn new<const D: usize, const V: usize>(
+        discretisation: &Discretisation<D, C, V>,
+        options: PrimalDualOptions,
+    ) -> Result<Self, Error> {
         crate::error::require(
             options.strain_rate_floor >= SMALLEST_STRAIN_RATE_FLOOR
                 && options.strain_rate_floor <= options.first_strain_rate_floor,
@@ -126,11 +144,17 @@ impl PrimalDual {
             options.floor_factor,
             "between 0 and 1, both excluded",
         )?;
+        crate::error::require(
+            options.linear_tolerance > 0.0 && options.linear_tolerance < 1.0,
+            "solver.linear_tolerance",
+            options.linear_tolerance,
+            "between 0 and 1, both excluded",
+        )?;
         let velocities = discretisation.velocities();
         let cells = discretisation.cells();
         Ok(Self {
             options,
-            matrix: StepMatrix::new(discretisation, NEWTON_TOLERANCE)?,
+            matrix: StepMatrix::new(discretisation, options.linear_tolerance)?,
             trial: FlowState::at_rest(discretisation, vec![0.0; cells]),
             points: vec![LinearisedPoint::default(); discretisation.points().len()],
             released: vec![false; cells],
@@ -142,10 +166,10 @@ impl PrimalDual {
     }
 
     /// One run of Newton's method on `self.trial`, which starts as a copy of `start`.
-    fn attempt<R: Rheology>(
+    fn attempt<R: Rheology, const D: usize, const V: usize>(
         &mut self,
-        problem: &StepProblem<'_, R>,
-        start: &FlowState,
+        problem: &StepProblem<'_, R, D, C, V>,
+        start: &FlowState<C>,
         strategy: &Strategy,
         report: &mut StepReport,
     ) {
@@ -185,17 +209,21 @@ impl PrimalDual {
     }
 
     /// ∂s/∂γ = κ/γ_ε 1 + (κ_γ γ − s) ⊗ γ/γ_ε² and ∂s/∂p = κ_p γ/γ_ε, with γ_ε = √(|γ|² + ε²).
-    fn linearise<R: Rheology>(&mut self, problem: &StepProblem<'_, R>, floor: f64) {
+    fn linearise<R: Rheology, const D: usize, const V: usize>(
+        &mut self,
+        problem: &StepProblem<'_, R, D, C, V>,
+        floor: f64,
+    ) {
         let points = problem.discretisation.points();
         for ((point, linear), s) in points.iter().zip(&mut self.points).zip(&self.trial.s) {
             let (gamma, rate, threshold) =
                 evaluate(problem.rheology, point, &self.trial.u, &self.trial.p, floor);
             let viscosity = threshold.stress / rate;
             let inverse_square = 1.0 / (rate * rate);
-            for a in 0..COMPONENTS {
+            for a in 0..C {
                 linear.stress[a] = viscosity * gamma[a];
                 linear.by_pressure[a] = threshold.by_pressure * gamma[a] / rate;
-                for b in 0..COMPONENTS {
+                for b in 0..C {
                     linear.by_rate[a][b] =
                         (threshold.by_rate * gamma[a] - s[a]) * gamma[b] * inverse_square;
                 }
@@ -206,15 +234,19 @@ impl PrimalDual {
 
     /// Fills the matrix, with ∂s/∂γ symmetrised (positive definite while |s| ≤ κ), and the
     /// right-hand side.
-    fn assemble<R: Rheology>(&mut self, problem: &StepProblem<'_, R>, u_old: &[f64]) {
+    fn assemble<R: Rheology, const D: usize, const V: usize>(
+        &mut self,
+        problem: &StepProblem<'_, R, D, C, V>,
+        u_old: &[f64],
+    ) {
         let discretisation = problem.discretisation;
         let linear = &self.points;
         self.matrix
             .fill(discretisation, problem.dt, &self.released, |q| {
-                let mut c = linear[q].by_rate;
-                let mean = 0.5 * (c[0][1] + c[1][0]);
-                c[0][1] = mean;
-                c[1][0] = mean;
+                let by_rate = &linear[q].by_rate;
+                let c = std::array::from_fn(|a| {
+                    std::array::from_fn(|b| 0.5 * (by_rate[a][b] + by_rate[b][a]))
+                });
                 (c, linear[q].by_pressure)
             });
         let velocities = discretisation.velocities();
@@ -225,9 +257,7 @@ impl PrimalDual {
         }
         for (point, linear) in discretisation.points().iter().zip(&self.points) {
             for (slot, &j) in point.velocities().iter().enumerate() {
-                momentum[j] -= point.weight
-                    * (point.rates(0)[slot] * linear.stress[0]
-                        + point.rates(1)[slot] * linear.stress[1]);
+                momentum[j] -= point.weight * point.force(slot, &linear.stress);
             }
         }
         let forces = discretisation
@@ -253,7 +283,11 @@ impl PrimalDual {
     /// right-hand side.
     /// The first iteration goes by the pressure alone, because the velocity that a step begins with
     /// has a divergence of its own.
-    fn release(&mut self, discretisation: &Discretisation, is_first: bool) {
+    fn release<const D: usize, const V: usize>(
+        &mut self,
+        discretisation: &Discretisation<D, C, V>,
+        is_first: bool,
+    ) {
         let continuity = &mut self.right_hand_side[self.trial.u.len()..];
         divergence_residual(discretisation, &self.trial.u, continuity);
         if self.options.one_sided_pressure {
@@ -270,9 +304,9 @@ impl PrimalDual {
 
     /// Largest fraction 1, ½, ¼, ⅛ of the change of velocity with which the convex functional of
     /// the step at the new pressure does not grow.
-    fn line_search<R: Rheology>(
+    fn line_search<R: Rheology, const D: usize, const V: usize>(
         &mut self,
-        problem: &StepProblem<'_, R>,
+        problem: &StepProblem<'_, R, D, C, V>,
         u_old: &[f64],
         floor: f64,
     ) -> f64 {
@@ -297,17 +331,23 @@ impl PrimalDual {
     }
 
     /// Adds the change, and brings stresses that ended above the threshold back onto it.
-    fn update<R: Rheology>(&mut self, problem: &StepProblem<'_, R>, floor: f64, fraction: f64) {
+    fn update<R: Rheology, const D: usize, const V: usize>(
+        &mut self,
+        problem: &StepProblem<'_, R, D, C, V>,
+        floor: f64,
+        fraction: f64,
+    ) {
         let (du, dp) = self.change.split_at(self.trial.u.len());
         let points = problem.discretisation.points();
         for ((point, linear), s) in points.iter().zip(&self.points).zip(&mut self.trial.s) {
             let rate = point.strain_rate_change(du);
             let pressure = point.pressure_change(dp);
             for (a, s) in s.iter_mut().enumerate() {
-                let target = linear.stress[a]
-                    + linear.by_rate[a][0] * rate[0]
-                    + linear.by_rate[a][1] * rate[1]
-                    + linear.by_pressure[a] * pressure;
+                let mut target = linear.stress[a];
+                for (by_rate, rate) in linear.by_rate[a].iter().zip(&rate) {
+                    target += by_rate * rate;
+                }
+                target += linear.by_pressure[a] * pressure;
                 *s += fraction * (target - *s);
             }
         }
@@ -326,16 +366,15 @@ impl PrimalDual {
             let size = strain_rate_norm(*s);
             if size > threshold.stress {
                 let shrink = threshold.stress / size;
-                s[0] *= shrink;
-                s[1] *= shrink;
+                s.iter_mut().for_each(|s| *s *= shrink);
             }
         }
     }
 
     /// All residuals of the trial state; overwrites the right-hand side.
-    fn residuals<R: Rheology>(
+    fn residuals<R: Rheology, const D: usize, const V: usize>(
         &mut self,
-        problem: &StepProblem<'_, R>,
+        problem: &StepProblem<'_, R, D, C, V>,
         u_old: &[f64],
         floor: f64,
     ) -> Residuals {
@@ -345,10 +384,7 @@ impl PrimalDual {
         for (point, s) in problem.discretisation.points().iter().zip(&self.trial.s) {
             let (gamma, rate, threshold) =
                 evaluate(problem.rheology, point, &self.trial.u, &self.trial.p, floor);
-            let miss = [
-                s[0] * rate - threshold.stress * gamma[0],
-                s[1] * rate - threshold.stress * gamma[1],
-            ];
+            let miss: [f64; C] = std::array::from_fn(|a| s[a] * rate - threshold.stress * gamma[a]);
             let scale = rate * (threshold.stress + 1e-3);
             stress = largest_or_nan(stress, strain_rate_norm(miss) / scale);
         }
@@ -361,7 +397,10 @@ impl PrimalDual {
     }
 
     /// Largest |∇·u|, or largest miss of p ≥ 0 ⟂ ∇·u ≥ 0.
-    fn continuity_residual(&mut self, discretisation: &Discretisation) -> f64 {
+    fn continuity_residual<const D: usize, const V: usize>(
+        &mut self,
+        discretisation: &Discretisation<D, C, V>,
+    ) -> f64 {
         let continuity = &mut self.right_hand_side[self.trial.u.len()..];
         let divergence = divergence_residual(discretisation, &self.trial.u, continuity);
         if !self.options.one_sided_pressure {
@@ -378,7 +417,11 @@ impl PrimalDual {
             })
     }
 
-    fn is_converged<R>(&self, problem: &StepProblem<'_, R>, residuals: &Residuals) -> bool {
+    fn is_converged<R, const D: usize, const V: usize>(
+        &self,
+        problem: &StepProblem<'_, R, D, C, V>,
+        residuals: &Residuals,
+    ) -> bool {
         let axes = problem.discretisation.grid().axes();
         let spacing = axes
             .iter()
@@ -398,15 +441,15 @@ impl PrimalDual {
 
 /// γ, γ_ε = √(|γ|² + ε²) and the threshold at a point.
 #[inline]
-fn evaluate<R: Rheology>(
+fn evaluate<R: Rheology, const C: usize, const V: usize>(
     rheology: &R,
-    point: &QuadraturePoint,
+    point: &QuadraturePoint<C, V>,
     u: &[f64],
     p: &[f64],
     floor: f64,
-) -> ([f64; COMPONENTS], f64, crate::rheology::Threshold) {
+) -> ([f64; C], f64, crate::rheology::Threshold) {
     let gamma = point.strain_rate(u);
-    let rate = (gamma[0] * gamma[0] + gamma[1] * gamma[1] + floor * floor).sqrt();
+    let rate = (squared_norm(&gamma) + floor * floor).sqrt();
     let (pressure, depends) = threshold_pressure(point.pressure(p));
     let mut threshold = point.law.threshold(rheology, rate, pressure);
     if !depends {
@@ -417,8 +460,8 @@ fn evaluate<R: Rheology>(
 
 /// J(u) = ½ (u − u*)ᵀ M (u − u*)/Δt + Σ W Ψ(γ_ε, p) − F·u: convex in u, least at the solution of
 /// the step among velocities without divergence.
-fn functional<R: Rheology>(
-    problem: &StepProblem<'_, R>,
+fn functional<R: Rheology, const D: usize, const C: usize, const V: usize>(
+    problem: &StepProblem<'_, R, D, C, V>,
     u_old: &[f64],
     u: &[f64],
     p: &[f64],
@@ -437,7 +480,7 @@ fn functional<R: Rheology>(
         .iter()
         .map(|point| {
             let gamma = point.strain_rate(u);
-            let rate = (gamma[0] * gamma[0] + gamma[1] * gamma[1] + floor * floor).sqrt();
+            let rate = (squared_norm(&gamma) + floor * floor).sqrt();
             let (pressure, _) = threshold_pressure(point.pressure(p));
             point.weight * point.law.potential(problem.rheology, rate, pressure)
         })
@@ -445,13 +488,15 @@ fn functional<R: Rheology>(
     kinetic + dissipated
 }
 
-impl<R: Rheology> YieldSolver<R> for PrimalDual {
+impl<R: Rheology, const D: usize, const C: usize, const V: usize> YieldSolver<R, D, C, V>
+    for PrimalDual<C>
+{
     /// Three attempts: from the previous stress at the final ε, from a large ε, and from a larger
     /// one with slow descent and line search.
     fn step(
         &mut self,
-        problem: &StepProblem<'_, R>,
-        state: &mut FlowState,
+        problem: &StepProblem<'_, R, D, C, V>,
+        state: &mut FlowState<C>,
     ) -> Result<StepReport, Error> {
         let options = self.options;
         let strategies = [
@@ -475,7 +520,7 @@ impl<R: Rheology> YieldSolver<R> for PrimalDual {
             },
         ];
         // Without stress there is nothing warm to start from, unless the material has none.
-        let is_cold = state.s.iter().all(|s| *s == [0.0; COMPONENTS])
+        let is_cold = state.s.iter().all(|s| *s == [0.0; C])
             && problem.rheology.threshold(1.0, 1.0).stress > 0.0;
         let mut report = StepReport::default();
         for strategy in &strategies[usize::from(is_cold)..] {

@@ -122,10 +122,8 @@ pub(crate) fn faces_over(
     thin_layer: ThinLayer,
 ) -> Faces {
     let mut faces = Faces {
-        acceleration,
-        pressure: vec![NONE; topology.cells()],
         shares: Some([0, 1].map(|c| vec![[1.0; 2]; topology.faces(c)])),
-        ..Faces::default()
+        ..Faces::empty(topology.cells(), acceleration)
     };
     for cell in 0..topology.cells() {
         if ground.master[cell] != cell {

@@ -10,7 +10,6 @@ use super::Ground;
 use crate::free_surface::fraction::volume_in;
 use crate::free_surface::plane::Plane;
 use crate::free_surface::topology::{NONE, Topology};
-use crate::grid::DIMENSIONS;
 
 /// Parts of a slab below this are round-off.
 const ROUND_OFF: f64 = 1e-13;
@@ -21,7 +20,7 @@ const LONGEST_WAY: usize = 256;
 /// Times that excess is looked for.
 const ROUNDS: usize = 4;
 
-impl Ground {
+impl<const D: usize> Ground<D> {
     /// Share of matter in the free part of a slab behind a face (corners in cell coordinates).
     pub(crate) fn matter(
         &self,
@@ -48,7 +47,7 @@ impl Ground {
     }
 
     /// Moves what does not fit into cells beside the ground to where there is room.
-    pub(crate) fn settle(&self, topology: &Topology, fractions: &mut [f64]) {
+    pub(crate) fn settle(&self, topology: &Topology<D>, fractions: &mut [f64]) {
         for _ in 0..ROUNDS {
             let mut moved = false;
             for cell in 0..fractions.len() {
@@ -70,37 +69,43 @@ impl Ground {
     }
 
     /// Open neighbours of a cell, the one above last.
-    fn beside(&self, topology: &Topology, cell: usize) -> [usize; 2 * DIMENSIONS] {
-        let mut order = [NONE; 2 * DIMENSIONS];
-        for (n, slot) in order.iter_mut().enumerate() {
-            let (axis, side) = (n / 2, n % 2);
-            let face = topology.cell_faces[cell][axis][side];
-            if face != NONE && self.aperture[axis][face] > 0.0 {
-                *slot = topology.cell_neighbours[cell][axis][side];
-            }
-        }
-        order
+    fn beside(&self, topology: &Topology<D>, cell: usize) -> [[usize; 2]; D] {
+        std::array::from_fn(|axis| {
+            [0, 1].map(|side| {
+                let face = topology.cell_faces[cell][axis][side];
+                if face != NONE && self.aperture[axis][face] > 0.0 {
+                    topology.cell_neighbours[cell][axis][side]
+                } else {
+                    NONE
+                }
+            })
+        })
     }
 
     /// Gives what a cell holds too much to its neighbours, as much as they have room for, and the rest
     /// to the one above, or where that is shut off to the one with the widest way to it. Says which one may
     /// hold too much now.
-    fn push_out(&self, topology: &Topology, fractions: &mut [f64], cell: usize) -> Option<usize> {
+    fn push_out(
+        &self,
+        topology: &Topology<D>,
+        fractions: &mut [f64],
+        cell: usize,
+    ) -> Option<usize> {
         let mut excess = fractions[cell] - self.free[cell];
         if excess <= EXCESS {
             return None;
         }
         let beside = self.beside(topology, cell);
-        for next in beside.into_iter().filter(|&next| next != NONE) {
+        for next in beside.into_iter().flatten().filter(|&next| next != NONE) {
             let part = (self.free[next] - fractions[next]).max(0.0).min(excess);
             fractions[next] += part;
             fractions[cell] -= part;
             excess -= part;
         }
-        let mut next = beside[2 * DIMENSIONS - 1];
+        let mut next = beside[D - 1][1];
         if next == NONE {
             let mut widest = 0.0;
-            for (n, &other) in beside.iter().enumerate() {
+            for (n, &other) in beside.as_flattened().iter().enumerate() {
                 let face = topology.cell_faces[cell][n / 2][n % 2];
                 if other != NONE && self.aperture[n / 2][face] > widest {
                     widest = self.aperture[n / 2][face];
@@ -117,11 +122,11 @@ impl Ground {
     }
 
     /// Takes what a cell has less than nothing from its neighbours. Says whether there was any.
-    fn fill_up(&self, topology: &Topology, fractions: &mut [f64], cell: usize) -> bool {
+    fn fill_up(&self, topology: &Topology<D>, fractions: &mut [f64], cell: usize) -> bool {
         if fractions[cell] >= -EXCESS {
             return false;
         }
-        for next in self.beside(topology, cell) {
+        for next in self.beside(topology, cell).into_iter().flatten() {
             if next != NONE {
                 let part = fractions[next].max(0.0).min(-fractions[cell]);
                 fractions[next] -= part;

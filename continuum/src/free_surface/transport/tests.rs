@@ -62,15 +62,16 @@ fn step(
     (courant, nth): (f64, usize),
 ) {
     let incompressible: Vec<bool> = fractions.iter().map(|&f| f > 0.5).collect();
+    let order = if nth.is_multiple_of(2) {
+        vec![0, 1]
+    } else {
+        vec![1, 0]
+    };
     let motion = Motion {
         passes: 1,
         topology,
         courant: [courant; 2],
-        order: if nth.is_multiple_of(2) {
-            &[0, 1]
-        } else {
-            &[1, 0]
-        },
+        orders: &[order],
         incompressible: &incompressible,
         ground: None,
     };

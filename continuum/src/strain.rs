@@ -1,0 +1,84 @@
+//! The components of the strain rate, by the number of axes.
+//!
+//! D = (∇u + ∇uᵀ)/2 without its trace has two components in a plane flow and five in space. They are
+//! chosen so that γ̇² = 2 D:D is the sum of their squares:
+//!
+//! ```text
+//! plane:  γ = (D_xx − D_zz, 2 D_xz)
+//! space:  γ = (D_xx − D_yy, (D_xx + D_yy − 2 D_zz)/√3, 2 D_xy, 2 D_xz, 2 D_yz)
+//! ```
+//!
+//! The stress has the components s that do the work s·γ = τ:D: ((τ_xx − τ_zz)/2, τ_xz) in the plane,
+//! ((τ_xx − τ_yy)/2, (τ_xx + τ_yy − 2 τ_zz)/(2√3), τ_xy, τ_xz, τ_yz) in space, so that
+//! |τ|² = ½ τ:τ is the sum of their squares too.
+
+/// Components of the strain rate in space.
+pub const SPACE_COMPONENTS: usize = 5;
+/// Most velocities that a quadrature point in space depends on: six faces of the cell, and two more across
+/// each of the three edges that meet at its corner.
+pub const SPACE_VELOCITIES: usize = 12;
+
+/// 1/√3.
+const THIRD_ROOT: f64 = 0.577_350_269_189_625_8;
+
+/// Components to which the stretching ∂u_axis/∂x_axis belongs, each with its factor.
+#[inline]
+pub(crate) fn stretching<const D: usize>(axis: usize) -> &'static [(usize, f64)] {
+    match (D, axis) {
+        (2, 0) => &[(0, 1.0)],
+        (2, _) => &[(0, -1.0)],
+        (_, 0) => &[(0, 1.0), (1, THIRD_ROOT)],
+        (_, 1) => &[(0, -1.0), (1, THIRD_ROOT)],
+        _ => &[(1, -2.0 * THIRD_ROOT)],
+    }
+}
+
+/// The component of the shear between two axes, the lower first.
+#[inline]
+pub(crate) fn shear_row<const D: usize>(low: usize, high: usize) -> usize {
+    if D == 2 { 1 } else { low + high + 1 }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::rheology::strain_rate_norm;
+
+    /// Components of a velocity gradient without divergence, `gradient[i][j]` = ∂u_i/∂x_j.
+    fn components(gradient: [[f64; 3]; 3]) -> [f64; SPACE_COMPONENTS] {
+        let mut rate = [0.0; SPACE_COMPONENTS];
+        for i in 0..3 {
+            for &(row, factor) in stretching::<3>(i) {
+                rate[row] += factor * gradient[i][i];
+            }
+            for j in 0..i {
+                rate[shear_row::<3>(j, i)] += gradient[i][j] + gradient[j][i];
+            }
+        }
+        rate
+    }
+
+    #[test]
+    fn the_norm_is_that_of_the_tensor() {
+        let gradient = [[0.3, 1.1, -0.6], [-0.4, 0.5, 0.9], [0.2, -1.7, -0.8]];
+        let mut squares = 0.0;
+        for (i, row) in gradient.iter().enumerate() {
+            for (j, value) in row.iter().enumerate() {
+                squares += f64::powi(0.5 * (value + gradient[j][i]), 2);
+            }
+        }
+        let tensor = f64::sqrt(2.0 * squares);
+        assert!((strain_rate_norm(components(gradient)) / tensor - 1.0).abs() < 1e-15);
+    }
+
+    /// A plane flow has the same γ̇ in whichever plane it lies, and the one of two components.
+    #[test]
+    fn plane_flow_is_a_case_of_flow_in_space() {
+        let plane = strain_rate_norm([2.0 * 0.7, 1.3]);
+        for [a, b] in [[0, 1], [0, 2], [1, 2]] {
+            let mut gradient = [[0.0; 3]; 3];
+            (gradient[a][a], gradient[b][b], gradient[a][b]) = (0.7, -0.7, 1.3);
+            assert!((strain_rate_norm(components(gradient)) - plane).abs() < 1e-15);
+        }
+    }
+}

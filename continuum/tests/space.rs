@@ -1,0 +1,340 @@
+//! Flow in space against exact solutions and against the plane solver: rest, Bagnold flow along any
+//! direction, plane flow along any axis, the collapse of a cylinder.
+// A helper of a test may panic like the test itself.
+#![allow(clippy::unwrap_used)]
+
+use colluvium_continuum::cylinder_collapse::{CylinderCase, CylinderCollapse};
+use colluvium_continuum::free_surface::plane::Plane;
+use colluvium_continuum::free_surface::{SpaceFlow, SurfaceFlow, SurfaceOptions};
+use colluvium_continuum::grid::{Axis, Boundary, Grid};
+use colluvium_continuum::rheology::MuI;
+use colluvium_continuum::yield_step::PrimalDualOptions;
+
+const ROUGH: Boundary = Boundary::NoSlip { velocity: 0.0 };
+const SMOOTH: Boundary = Boundary::FreeSlip;
+
+/// μ_s 0.32, Δμ 0.28, I_0 0.4 in natural units.
+fn grains(diameter: f64) -> MuI {
+    MuI::new(0.32, 0.60, 0.4, diameter, 1.0, 1.0)
+}
+
+fn bounded(length: f64, cells: usize, low: Boundary, high: Boundary) -> Axis {
+    Axis::Bounded {
+        length,
+        cells,
+        low,
+        high,
+    }
+}
+
+/// Settings under which rest can be told from creep.
+fn precise(largest_step: f64) -> SurfaceOptions {
+    let mut options = SurfaceOptions {
+        largest_step,
+        growth: 1e9,
+        ..SurfaceOptions::default()
+    };
+    options.solver = exact(options.solver);
+    options
+}
+
+/// The equations of a step solved far beyond what a flow needs.
+fn exact(solver: PrimalDualOptions) -> PrimalDualOptions {
+    PrimalDualOptions {
+        strain_rate_floor: 1e-7,
+        momentum_tolerance: 1e-9,
+        divergence_tolerance: 1e-10,
+        stress_tolerance: 1e-9,
+        tolerance_in_motion: 1.0,
+        linear_tolerance: 1e-9,
+        ..solver
+    }
+}
+
+/// A box filled up to a plane normal to gravity, which is tilted against both horizontal axes: nothing
+/// moves and the pressure is ρ g times the depth, to round-off.
+#[test]
+fn plane_surfaces_normal_to_gravity_rest_exactly() {
+    let cells = 10;
+    let h = 1.0 / cells as f64;
+    for [along_x, along_y] in [[0.0, 0.0], [0.1, 0.07], [-0.2, 0.13]] {
+        let length = f64::sqrt(1.0 + along_x * along_x + along_y * along_y);
+        let up = [along_x / length, along_y / length, 1.0 / length];
+        let gravity = up.map(|n| -n);
+        let level = 0.5 * (up[0] + up[1]) + 0.53 * up[2];
+        let depth = |x: [f64; 3]| level - (0..3).map(|a| up[a] * x[a]).sum::<f64>();
+        let index = |cell: usize| [cell % cells, cell / cells % cells, cell / (cells * cells)];
+        let fractions = (0..cells.pow(3))
+            .map(|cell| {
+                let plane = Plane {
+                    normal: up,
+                    offset: depth(index(cell).map(|i| i as f64 * h)) / h,
+                };
+                plane.volume_in([0.0; 3], [1.0; 3])
+            })
+            .collect();
+        let axis = bounded(1.0, cells, ROUGH, ROUGH);
+        let mut flow = SpaceFlow::in_space(
+            Grid::with_moving_surface([axis; 3]).unwrap(),
+            fractions,
+            grains(1.0 / 30.0),
+            gravity,
+            precise(0.05),
+        )
+        .unwrap();
+        for _ in 0..3 {
+            flow.step(f64::INFINITY).unwrap();
+        }
+        assert!(flow.max_speed() < 1e-7, "{:e}", flow.max_speed());
+        let mut worst = 0.0_f64;
+        for (cell, p) in flow.state().pressure.iter().enumerate() {
+            if *p >= 0.0 {
+                let exact = depth(index(cell).map(|i| (i as f64 + 0.5) * h));
+                worst = worst.max((p - exact).abs());
+            }
+        }
+        eprintln!(
+            "tilt {along_x} {along_y}: speed {:e}, pressure off by {worst:e}",
+            flow.max_speed()
+        );
+        assert!(worst < 1e-8 * h, "{along_x} {along_y} {worst:e}");
+    }
+}
+
+const SLOPE: f64 = 0.43;
+
+fn layer(cells: usize) -> (Axis, Vec<f64>) {
+    let h = 1.25 / cells as f64;
+    let fractions = (0..cells).map(|k| (1.0 / h - k as f64).clamp(0.0, 1.0));
+    (bounded(1.25, cells, ROUGH, SMOOTH), fractions.collect())
+}
+
+fn steady() -> SurfaceOptions {
+    let mut options = precise(1.0);
+    options.solver.strain_rate_floor = 1e-6;
+    options
+}
+
+/// Gravity on a slope that falls along a direction between x and y.
+fn down(angle: f64) -> [f64; 3] {
+    let along = SLOPE.sin();
+    [along * angle.cos(), along * angle.sin(), -SLOPE.cos()]
+}
+
+/// Steady Bagnold flow in a box that is higher than the layer, with `columns` of cells.
+fn bagnold(cells: usize, columns: [Axis; 2], angle: f64) -> SpaceFlow<MuI> {
+    let (z, fractions) = layer(cells);
+    let count = columns[0].cells() * columns[1].cells();
+    let fractions = fractions
+        .into_iter()
+        .flat_map(|f| std::iter::repeat_n(f, count));
+    let mut flow = SpaceFlow::in_space(
+        Grid::with_moving_surface([columns[0], columns[1], z]).unwrap(),
+        fractions.collect(),
+        grains(0.04),
+        down(angle),
+        steady(),
+    )
+    .unwrap();
+    flow.accelerate_in_place(1e8).unwrap();
+    flow
+}
+
+/// Relative L2 errors of both components of Bagnold flow down a direction between x and y.
+fn bagnold_errors(cells: usize, angle: f64) -> [f64; 2] {
+    let flow = bagnold(cells, [Axis::Flat; 2], angle);
+    let inertial_number = 0.4 * (SLOPE.tan() - 0.32) / (0.60 - SLOPE.tan());
+    let surface = 2.0 / 3.0 * inertial_number / 0.04 * SLOPE.cos().sqrt();
+    let h = 1.25 / cells as f64;
+    [(0, angle.cos()), (1, angle.sin())].map(|(component, share): (usize, f64)| {
+        let (mut miss, mut size) = (0.0, 0.0);
+        for (k, u) in flow.state().velocity[component].iter().enumerate() {
+            let z = (k as f64 + 0.5) * h;
+            if z < 1.0 {
+                let exact = share * surface * (1.0 - (1.0 - z).powf(1.5));
+                miss += (u - exact).powi(2);
+                size += exact * exact;
+            }
+        }
+        f64::sqrt(miss / size)
+    })
+}
+
+/// Both shear stresses under one root: a flow down the diagonal, or any other direction, has the exact
+/// profile in both components, to second order.
+#[test]
+fn bagnold_flow_down_any_direction() {
+    for angle in [std::f64::consts::FRAC_PI_4, 0.3] {
+        let errors = [16, 32, 64].map(|cells| bagnold_errors(cells, angle));
+        eprintln!("Bagnold flow at {angle}: {errors:?}");
+        for component in 0..2 {
+            let order = (errors[0][component] / errors[2][component]).log2() / 2.0;
+            assert!(
+                errors[2][component] < 1e-4 && order > 1.9,
+                "{errors:?} {order}"
+            );
+        }
+    }
+}
+
+/// The plane solver is the case of one flat axis, whichever it is, and a periodic axis is no different.
+#[test]
+fn plane_flow_is_the_same_along_x_and_y() {
+    let cells = 16;
+    let (z, fractions) = layer(cells);
+    let mut plane = SurfaceFlow::at_rest(
+        Grid::with_moving_surface([Axis::Flat, z]).unwrap(),
+        fractions,
+        grains(0.04),
+        [SLOPE.sin(), -SLOPE.cos()],
+        steady(),
+    )
+    .unwrap();
+    plane.accelerate_in_place(1e8).unwrap();
+    let expected = &plane.state().velocity[0];
+    let periodic = Axis::Periodic {
+        length: 0.3,
+        cells: 3,
+    };
+    let quarter = std::f64::consts::FRAC_PI_2;
+    for (columns, angle, component) in [
+        ([Axis::Flat; 2], 0.0, 0),
+        ([Axis::Flat; 2], quarter, 1),
+        ([periodic, periodic], 0.0, 0),
+        ([Axis::Flat, periodic], quarter, 1),
+    ] {
+        let flow = bagnold(cells, columns, angle);
+        let count = columns[0].cells() * columns[1].cells();
+        let mut worst = 0.0_f64;
+        for (column, u) in flow.state().velocity[component].iter().enumerate() {
+            // Above the surface there is nothing that could move.
+            if (column / count) as f64 * 1.25 / cells as f64 <= 1.0 {
+                worst = worst.max((u - expected[column / count]).abs());
+            }
+        }
+        eprintln!("{columns:?}: differs by {worst:e}");
+        assert!(worst < 1e-5, "{columns:?} {worst:e}");
+    }
+}
+
+/// Glass beads: tan 20.9°, tan 32.76°, I_0 0.279 (Jop, Forterre & Pouliquen, *Nature* 441 (2006) 727), with
+/// 50 grains across the height of the cylinder.
+fn beads() -> MuI {
+    MuI::new(0.382, 0.643, 0.279, 0.02, 1.0, 1.0)
+}
+
+fn cylinder(aspect: f64, cells: usize, rheology: MuI) -> CylinderCase {
+    CylinderCase {
+        aspect,
+        height: 1.0,
+        gravity: 1.0,
+        rheology,
+        cells,
+        length_scaled: (1.0 + 1.9 * aspect) / aspect,
+        whole: false,
+    }
+}
+
+/// Runs to rest or to `end`; the collapse, and whether it came to rest.
+fn run(case: &CylinderCase, options: &SurfaceOptions, end: f64) -> (CylinderCollapse, bool) {
+    let mut collapse = CylinderCollapse::new(case, options).unwrap();
+    let clock = std::time::Instant::now();
+    let (mut cell_steps, mut steps, mut newton) = (0, 0, 0);
+    let mut at_rest = false;
+    while collapse.time() < end - 1e-9 && !at_rest {
+        let step = collapse.step(end).unwrap();
+        cell_steps += step.active_cells;
+        steps += 1;
+        newton += step.newton_iterations;
+        assert!(collapse.volume_drift().abs() < 1e-12);
+        at_rest = collapse.is_at_rest(&step);
+    }
+    eprintln!(
+        "a = {}, {} cells: run-out {:.3} a, t {:.2}, {steps} steps, {newton} iterations, {cell_steps} cell-steps, {:.1} s\n  {:?}\n  {:?}",
+        case.aspect,
+        case.cells,
+        runout(&collapse, case) / case.aspect,
+        collapse.time(),
+        clock.elapsed().as_secs_f64(),
+        collapse.flow().spent(),
+        collapse.front(EDGE),
+    );
+    for f in &collapse.flow().state().fractions {
+        assert!((0.0..=1.0 + 1e-9).contains(f), "{f}");
+    }
+    (collapse, at_rest)
+}
+
+/// The heap has its edge where it is as high as a grain.
+const EDGE: f64 = 0.02;
+/// Run-out over a that experiments find: 1.24 (Lube et al. 2004) and 1.35 (Lajeunesse et al. 2004) for
+/// a < 1.7 and 3, a quarter less and more.
+const BAND: std::ops::Range<f64> = 0.93..1.69;
+
+fn runout(collapse: &CylinderCollapse, case: &CylinderCase) -> f64 {
+    collapse.front(EDGE).radius / case.radius() - 1.0
+}
+
+/// To rest in finite time, with its volume to round-off, within the band of the experiments. Negative
+/// control: with μ_s = 2 it does not run out far enough.
+#[test]
+fn cylinder_runs_out_as_far_as_measured() {
+    let case = cylinder(1.0, 20, beads());
+    let (collapse, at_rest) = run(&case, &SurfaceOptions::default(), 12.0);
+    assert!(at_rest && collapse.time() < 6.0, "{}", collapse.time());
+    assert!(BAND.contains(&runout(&collapse, &case)));
+    let stiff = MuI::new(2.0, 2.2, 0.279, 0.02, 1.0, 1.0);
+    let case = cylinder(1.0, 12, stiff);
+    let (collapse, _) = run(&case, &SurfaceOptions::default(), 4.0);
+    assert!(runout(&collapse, &case) < BAND.start);
+}
+
+/// The same for more columns and grids.
+#[test]
+#[ignore = "long: run by tests/validate.sh"]
+fn run_outs_by_aspect_ratio_and_grid() {
+    for aspect in [0.5, 1.0, 1.5] {
+        for cells in [16, 24, 32] {
+            let case = cylinder(aspect, cells, beads());
+            run(&case, &SurfaceOptions::default(), 12.0);
+        }
+    }
+}
+
+/// A whole cylinder mirrors itself across both axes and the diagonal: to round-off, which the flow
+/// amplifies, if the equations of a step are solved that far; to the tolerance of the solver as it is.
+#[test]
+fn whole_cylinder_stays_symmetric() {
+    let mut case = cylinder(1.0, 10, beads());
+    case.whole = true;
+    for (solver, bound) in [
+        (SurfaceOptions::default().solver, 1e-5),
+        (exact(SurfaceOptions::default().solver), 1e-10),
+    ] {
+        let options = SurfaceOptions {
+            solver,
+            ..SurfaceOptions::default()
+        };
+        let (collapse, _) = run(&case, &options, 3.0);
+        eprintln!("asymmetry {:e}", collapse.asymmetry());
+        assert!(collapse.asymmetry() < bound, "{:e}", collapse.asymmetry());
+    }
+}
+
+#[test]
+fn restart_gives_the_same_bits() {
+    let case = cylinder(1.0, 10, beads());
+    let options = SurfaceOptions::default();
+    let mut whole = CylinderCollapse::new(&case, &options).unwrap();
+    for _ in 0..6 {
+        whole.step(f64::INFINITY).unwrap();
+    }
+    let mut resumed = CylinderCollapse::new(&case, &options).unwrap();
+    resumed.set_state(whole.flow().state().clone()).unwrap();
+    for _ in 0..6 {
+        whole.step(f64::INFINITY).unwrap();
+        resumed.step(f64::INFINITY).unwrap();
+    }
+    assert_eq!(whole.flow().state(), resumed.flow().state());
+    assert!(resumed.set_state(Default::default()).is_err());
+}
