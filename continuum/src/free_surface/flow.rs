@@ -13,6 +13,7 @@ use super::ground::contact::sliding_place;
 use super::ground::faces::faces_over;
 use super::ground::{Contact, DUST, Ground, Terrain};
 use super::operators::{Material, Operators, POINTS};
+use super::outside::Outside;
 use super::plane::Plane;
 use super::topology::{NONE, Topology};
 use super::transport::{MASSLESS, Motion, Transport};
@@ -159,6 +160,9 @@ pub struct SurfaceFlow<R> {
     planes: Vec<Option<Plane>>,
     transport: Transport,
     side_walls: Option<SideWalls>,
+    outside: Option<Outside>,
+    /// Impulse of forces from outside that nobody has taken.
+    untaken: [f64; DIMENSIONS],
     ground: Option<Ground>,
     /// Matter and ground together.
     filled: Vec<f64>,
@@ -209,6 +213,8 @@ impl<R: Rheology> SurfaceFlow<R> {
             planes: Vec::new(),
             transport: Transport::default(),
             side_walls: None,
+            outside: None,
+            untaken: [0.0; DIMENSIONS],
             ground: None,
             filled: Vec::new(),
             solver: None,
@@ -305,6 +311,27 @@ impl<R: Rheology> SurfaceFlow<R> {
         self.state.stress.resize(points, [0.0; COMPONENTS]);
         self.saved.clone_from(&self.state);
         Ok(self)
+    }
+
+    /// From now on this acts from outside; on a flow over ground nothing does.
+    ///
+    /// # Errors
+    /// What belongs to another grid, or is out of range.
+    pub fn set_outside(&mut self, outside: Outside) -> Result<(), Error> {
+        outside.validate(self.topology.cells())?;
+        self.outside = Some(outside);
+        Ok(())
+    }
+
+    /// What acts from outside.
+    pub fn outside(&self) -> Option<&Outside> {
+        self.outside.as_ref()
+    }
+
+    /// Impulse of forces from outside on cells without a velocity of their own since the last call; forgotten
+    /// by it.
+    pub fn take_untaken(&mut self) -> [f64; DIMENSIONS] {
+        std::mem::take(&mut self.untaken)
     }
 
     /// The state.
@@ -606,6 +633,7 @@ impl<R: Rheology> SurfaceFlow<R> {
             faces: &faces,
             side_walls: self.side_walls,
             acceleration,
+            outside: self.outside.as_ref(),
         };
         let Operators {
             discretisation,
@@ -653,6 +681,12 @@ impl<R: Rheology> SurfaceFlow<R> {
         record.newton_iterations += report.iterations;
         record.residuals = report.residuals;
         if report.converged {
+            if let Some(outside) = &self.outside {
+                let rates = outside.untaken(&faces, &self.topology);
+                for (sum, rate) in self.untaken.iter_mut().zip(rates) {
+                    *sum += rate * dt;
+                }
+            }
             self.scatter(&faces, &places, dt);
         }
         Ok(report.converged)
@@ -663,6 +697,7 @@ impl<R: Rheology> SurfaceFlow<R> {
     fn falls_freely(&mut self, discretisation: &Discretisation, dt: f64) -> bool {
         let unknowns = &mut self.unknowns;
         let is_loose = self.ground.is_none()
+            && self.outside.is_none()
             && unknowns.p.iter().all(|p| *p <= f64::MIN_POSITIVE)
             && unknowns.s.iter().all(|s| *s == [0.0; COMPONENTS])
             && self.rheology.threshold(1.0, 0.0).stress == 0.0

@@ -9,6 +9,7 @@
 
 use super::faces::{ACTIVE, Face, Faces, weight_onto};
 use super::fraction::volume_in;
+use super::outside::Outside;
 use super::plane::Plane;
 use super::topology::{NONE, Topology};
 use crate::discretisation::{Discretisation, Parts, QuadraturePoint, VelocityAt, add_corner_shear};
@@ -36,6 +37,8 @@ pub(crate) struct Material<'a> {
     pub side_walls: Option<SideWalls>,
     /// Acceleration by gravity.
     pub acceleration: [f64; DIMENSIONS],
+    /// What lies beyond the surface, if it is not free.
+    pub outside: Option<&'a Outside>,
 }
 
 /// The operators, and the place of each quadrature point on the grid: cell times [`POINTS`] plus
@@ -62,6 +65,9 @@ impl Material<'_> {
             if fraction > EMPTY {
                 self.add_points(cell, &mut parts.points, &mut places);
             }
+        }
+        if let Some(outside) = self.outside {
+            outside.lay(&mut parts, &places, self.faces, self.topology);
         }
         Operators {
             discretisation: Discretisation::of_parts(self.grid.clone(), parts),
@@ -150,9 +156,13 @@ impl Material<'_> {
                     parts
                         .divergence
                         .push((p, j, outwards * self.grid.face_area(axis)));
-                    parts
-                        .gradient
-                        .push(outwards * parts.mass[j] / (distance * spacing));
+                    let push = outwards * parts.mass[j] / (distance * spacing);
+                    parts.gradient.push(push);
+                    if let Some(outside) = self.outside
+                        && self.faces.pressure[other] == NONE
+                    {
+                        parts.boundary_load[j] -= push * outside.on_surface(cell, other, distance);
+                    }
                 }
             }
         }
@@ -376,6 +386,14 @@ impl Material<'_> {
         best.map(|(_, p, factor)| (p, factor))
     }
 
+    /// What the pressure on a surface that is not free adds to the one extrapolated through it into a cell, by
+    /// p = f p_active + (1 − f) p_surface.
+    fn pressure_beyond(&self, cell: usize, factor: f64) -> f64 {
+        self.outside.map_or(0.0, |outside| {
+            (1.0 - factor) * outside.on_surface(cell, cell, 0.0)
+        })
+    }
+
     /// Adds the linear interpolation of pressure to a corner. On a wall it is extrapolated from the
     /// two cells above it; under a thin layer it is the layer's weight.
     fn add_corner_pressure(&self, corner: [usize; DIMENSIONS], point: &mut QuadraturePoint) {
@@ -390,6 +408,7 @@ impl Material<'_> {
             let Some(axis) = wall else {
                 if let Some((p, factor)) = self.pressure_at(cell, NEAREST_EXTRAPOLATION) {
                     point.add_pressure(p, share * factor);
+                    point.pressure_offset += share * self.pressure_beyond(cell, factor);
                 }
                 continue;
             };
@@ -398,7 +417,7 @@ impl Material<'_> {
             if self.fractions[cell] <= ACTIVE {
                 let weight =
                     weight_onto(&self.acceleration, axis, side) * self.fractions[cell] * spacing;
-                point.pressure_offset += share * weight;
+                point.pressure_offset += share * (weight + self.pressure_beyond(cell, 0.0));
                 continue;
             }
             let first = self.faces.pressure[cell];
@@ -413,6 +432,11 @@ impl Material<'_> {
             point.add_pressure(first, 1.5 * share);
             if let Some((p, factor)) = second {
                 point.add_pressure(p, -0.5 * share * factor);
+                let next = self.topology.cell_neighbours[cell][axis][1 - side];
+                if next != NONE {
+                    let beyond = self.pressure_beyond(next, factor);
+                    point.pressure_offset -= 0.5 * share * beyond;
+                }
             }
         }
     }
