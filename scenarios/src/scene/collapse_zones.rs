@@ -178,7 +178,7 @@ impl CollapseScene {
                 None => Err(at("zones").refuse(
                     "edge_scaled",
                     format!("{edge:.4} (computed: what lies {FLOWS} heights behind the foot hardly flows)"),
-                    &format!("{range}: a column of smaller aspect, or an edge of your own"),
+                    format!("{range}: a column of smaller aspect, or an edge of your own"),
                 )),
             };
         }

@@ -22,7 +22,7 @@ pub struct Cells {
 
 impl Cells {
     /// How many there are.
-    pub fn len(&self) -> usize {
+    pub fn count(&self) -> usize {
         self.counts[0] * self.counts[1]
     }
 
@@ -108,9 +108,9 @@ impl Sums {
     /// Nothing, on these cells.
     pub fn nothing(cells: &Cells) -> Self {
         Self {
-            cover: vec![Cover::default(); cells.len()],
-            stress: vec![[0.0; 3]; cells.len()],
-            instant: vec![[0.0; 3]; cells.len()],
+            cover: vec![Cover::default(); cells.count()],
+            stress: vec![[0.0; 3]; cells.count()],
+            instant: vec![[0.0; 3]; cells.count()],
         }
     }
 

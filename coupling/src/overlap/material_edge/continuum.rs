@@ -34,7 +34,7 @@ impl View {
             .extend(state.pressure.iter().map(|p| p * stress));
         self.velocity.clear();
         self.stress.clear();
-        for cell in 0..cells.len() {
+        for cell in 0..cells.count() {
             let (i, k) = (cell % columns, cell / columns);
             let low = i + (columns + 1) * k;
             let across = state.velocity[0][low] + state.velocity[0][low + 1];
@@ -83,7 +83,7 @@ impl View {
             let f = self.fraction[cell].min(1.0);
             fraction += hat * f;
             let above = cell + columns;
-            let at_surface = above >= cells.len() || !self.is_full(above);
+            let at_surface = above >= cells.count() || !self.is_full(above);
             // Linear from the centre to the surface, over the filled part.
             let factor = match at_surface {
                 true => (f / (2.0 * f - 1.0)).min(LARGEST_FACTOR),

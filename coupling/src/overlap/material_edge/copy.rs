@@ -75,8 +75,9 @@ impl MaterialEdge {
         self.collapse.set_state(state)?;
         self.account.copied += self.collapse.flow().volume() - before.0;
         let now = self.continuum_momentum();
-        for axis in 0..2 {
-            self.account.following[axis] += now[axis] - before.1[axis];
+        let changes = now.iter().zip(before.1);
+        for (sum, (now, before)) in self.account.following.iter_mut().zip(changes) {
+            *sum += now - before;
         }
         self.view.look(&self.collapse, &self.cells);
         Ok(())

@@ -9,12 +9,11 @@ use colluvium_dem::{GrainSample, Simulation};
 const LEAST_COVER: f64 = 0.3;
 /// Parts of a full cell's mass at which grains begin to cover a surface, and cover it all.
 const COVERS: [f64; 2] = [0.4, 0.7];
-/// Rows with less than this of a full row of shell bear nothing.
-const LEAST_ROW: f64 = 0.02;
+/// Rows with less than this of a full row of shell hand on what presses on them: a force on few grains throws them out.
+const LEAST_ROW: f64 = 0.3;
 /// Steepest slope of the edge that its area vector follows.
 const STEEPEST: f64 = 2.0;
-/// Half width in diameters of the band of labels in which a surface is looked for, and how far beyond the edge a
-/// grain has escaped.
+/// Half width in diameters of the band of labels in which a surface is looked for.
 const BAND: f64 = 1.0;
 
 /// Room for what is formed and forgotten in a step.
@@ -113,10 +112,10 @@ impl MaterialEdge {
             let load = &scratch.shell[bearer];
             let mean = load.momentum.map(|p| over(p, load.weight));
             let impedance = row.impedance(self.spec.settings.impedance, mean);
-            for axis in 0..2 {
-                scratch.forces[bearer][axis] += row.traction[axis] + impedance[axis];
-                self.laid.traction[axis] += row.traction[axis];
-                self.laid.impedance[axis] += impedance[axis];
+            for (axis, (traction, impedance)) in row.traction.iter().zip(impedance).enumerate() {
+                scratch.forces[bearer][axis] += traction + impedance;
+                self.laid.traction[axis] += traction;
+                self.laid.impedance[axis] += impedance;
             }
         }
         scratch.loads.clear();
@@ -188,7 +187,7 @@ impl MaterialEdge {
     }
 
     /// Mass of a cell full of continuum (kg).
-    fn full(&self) -> f64 {
+    pub(super) fn full(&self) -> f64 {
         self.spec.density() * self.cells.volume()
     }
 
@@ -201,7 +200,7 @@ impl MaterialEdge {
         );
         let [handshake, inner] = self.spec.zones();
         let full = self.full();
-        for cell in 0..self.cells.len() {
+        for cell in 0..self.cells.count() {
             let cover = &self.sums.cover[cell];
             let [xx, zz, xz] = self.sums.stress[cell];
             let part = cover.mass / full;
@@ -237,8 +236,8 @@ impl MaterialEdge {
         let pushed = (self.collapse.flow().state().velocity_time - before) * unit;
         let unit = self.impulse_unit();
         let untaken = self.collapse.flow_mut().take_untaken();
-        for axis in 0..2 {
-            self.account.untaken[axis] += untaken[axis] * unit;
+        for (sum, untaken) in self.account.untaken.iter_mut().zip(untaken) {
+            *sum += untaken * unit;
         }
         let mass = self.collapse.flow().volume() * unit / self.collapse.units().velocity;
         self.account.continuum_weight[1] -= mass * self.spec.case.gravity * pushed;
@@ -304,7 +303,7 @@ impl MaterialEdge {
         let dt = self.exchange_time();
         let rate = (dt / self.spec.settings.relaxation_time).min(1.0) / dt;
         let full = self.full();
-        for cell in 0..self.cells.len() {
+        for cell in 0..self.cells.count() {
             let cover = &self.sums.cover[cell];
             let holds = self.view.is_full(cell) && cover.buffer > 0.1 * full;
             self.held.accelerations[cell] = match holds {
@@ -369,72 +368,5 @@ impl MaterialEdge {
             .into_iter()
             .map(|moved| start + moved)
             .collect()
-    }
-
-    /// Sums |impulses| of what the grains were given.
-    fn watch_impulses(&mut self) {
-        let size = |[x, z]: [f64; 2]| f64::hypot(x, z);
-        let relaxation: f64 = self.given.relaxation.iter().copied().map(size).sum();
-        let traction: f64 = self.held.rows.iter().map(|row| size(row.traction)).sum();
-        self.monitors.impulse[0] += relaxation;
-        self.monitors.impulse[1] += traction * self.exchange_time();
-    }
-
-    /// Looks at both sides of the handshake surface.
-    fn watch(&mut self) {
-        let d = self.spec.case.rheology.diameter;
-        let columns = self.cells.counts[0];
-        let (mut slips, mut weights) = (0.0, 0.0);
-        let mut force = [0.0; 2];
-        for (k, &place) in self.held.handshake.iter().enumerate() {
-            let Some((fraction, [xx, _, _], _)) = self.view.across(&self.cells, place, k) else {
-                continue;
-            };
-            let at = place / self.cells.spacing - 0.5;
-            let low = at.floor();
-            let hats = [(0, 1.0 - (at - low)), (1, at - low)];
-            let mut grains = 0.0;
-            for (n, hat) in hats {
-                let i = (low as i64 + n).clamp(0, columns as i64 - 1) as usize;
-                let cell = i + columns * k;
-                grains += hat * self.sums.stress[cell][0];
-                let cover = &self.sums.cover[cell];
-                let mass = cover.buffer + cover.inner;
-                if mass > 0.0 {
-                    let slip = [0, 1].map(|a| (cover.buffer_slip[a] + cover.inner_slip[a]) / mass);
-                    weights += mass * hat;
-                    slips += mass * hat * (slip[0] * slip[0] + slip[1] * slip[1]);
-                }
-            }
-            force[0] -= fraction * grains;
-            force[1] -= fraction * xx;
-        }
-        let area = self.cells.spacing * self.spec.slab;
-        let slip = over(slips, weights).sqrt();
-        let full = self.full();
-        let (mut packed, mut cells) = (0.0, 0.0);
-        for (cell, cover) in self.sums.cover.iter().enumerate() {
-            let own = cover.buffer + cover.inner;
-            // Cells all of whose grains belong to the overlap, with continuum on all of them.
-            if own > 0.95 * cover.mass && self.view.fraction[cell] > 0.99 && own > 0.5 * full {
-                packed += own / full;
-                cells += 1.0;
-            }
-        }
-        let places: Vec<f64> = self.held.rows.iter().map(|row| row.place).collect();
-        let escaped = self.sighting.snapshot.grains.iter().filter(|g| {
-            let row = self.cells.rows(g.position.z)[0].0;
-            label_of(&self.labels, g).is_some() && g.position.x < places[row] - BAND * d
-        });
-        let escaped = escaped.count() as f64;
-        let m = &mut self.monitors;
-        m.exchanges += 1.0;
-        m.slip += slip;
-        m.largest_slip = m.largest_slip.max(slip);
-        for (sum, force) in m.force.iter_mut().zip(force) {
-            *sum += force * area;
-        }
-        m.packing += over(packed, cells);
-        m.escaped = m.escaped.max(escaped);
     }
 }

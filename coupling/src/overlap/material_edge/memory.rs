@@ -14,8 +14,8 @@ const FRONT: usize = 11 + account::NUMBERS;
 impl MaterialEdge {
     /// What every load changes.
     fn front(&self) -> Vec<f64> {
-        let mut front = Vec::with_capacity(FRONT + 4 * self.cells.len());
-        front.extend([self.cells.len() as f64, self.made as f64, self.kick]);
+        let mut front = Vec::with_capacity(FRONT + 4 * self.cells.count());
+        front.extend([self.cells.count() as f64, self.made as f64, self.kick]);
         for given in [&self.laid, &self.given] {
             front.extend(given.traction);
             front.extend(given.impedance);
@@ -104,7 +104,7 @@ impl MaterialEdge {
             && owed.len() == 2 * cells
             && edge_rows.len() == rows::NUMBERS * handshake.len()
             && handshake.len() == edge.cells.counts[1]
-            && edge.cells.len() == cells;
+            && edge.cells.count() == cells;
         let (scalars, forces) = front.split_at(FRONT);
         let Ok(account) = scalars[11..].try_into() else {
             return Ok(None);

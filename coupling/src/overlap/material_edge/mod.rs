@@ -23,6 +23,8 @@ mod copy;
 mod exchange;
 mod memory;
 mod rows;
+mod totals;
+mod watch;
 
 pub use account::{Account, Monitors};
 pub use cells::Cells;
@@ -221,15 +223,15 @@ impl MaterialEdge {
             sums: Sums::nothing(&cells),
             view: View::default(),
             held: Held {
-                accelerations: vec![[0.0; 2]; cells.len()],
+                accelerations: vec![[0.0; 2]; cells.count()],
                 rows: vec![Row::default(); cells.counts[1]],
                 reach: 0.0,
                 handshake: vec![spec.place + spec.settings.buffer; cells.counts[1]],
             },
-            laid: Given::nothing(cells.len()),
-            given: Given::nothing(cells.len()),
+            laid: Given::nothing(cells.count()),
+            given: Given::nothing(cells.count()),
             kick: 0.0,
-            owed: vec![[0.0; 2]; cells.len()],
+            owed: vec![[0.0; 2]; cells.count()],
             account: Account::default(),
             monitors: Monitors::default(),
             steps_of_loads,
@@ -239,7 +241,7 @@ impl MaterialEdge {
             timestep: simulation.timestep(),
             sighting: Sighting::default(),
             scratch: exchange::Scratch::default(),
-            outside: Outside::nothing(cells.len()),
+            outside: Outside::nothing(cells.count()),
             spec,
         })
     }
@@ -340,10 +342,15 @@ impl MaterialEdge {
         self.collapse.flow().momentum().map(|p| p * unit)
     }
 
-    /// Kinetic energy of the continuum, copy included, of the mean velocities of its cells (J).
+    /// Kinetic energy of the continuum behind the handshake surface, of the mean velocities of its cells (J).
     pub fn continuum_kinetic(&self) -> f64 {
+        let columns = self.cells.counts[0];
         let cells = self.view.velocity.iter().zip(&self.view.fraction);
-        let twice: f64 = cells.map(|([u, w], f)| f * (u * u + w * w)).sum();
+        let counted = cells.enumerate().filter(|(cell, _)| {
+            let place = ((cell % columns) as f64 + 0.5) * self.cells.spacing;
+            place < self.held.handshake[cell / columns]
+        });
+        let twice: f64 = counted.map(|(_, ([u, w], f))| f * (u * u + w * w)).sum();
         0.5 * self.spec.density() * self.cells.volume() * twice
     }
 
@@ -361,56 +368,6 @@ impl MaterialEdge {
     fn impulse_unit(&self) -> f64 {
         let u = self.collapse.units();
         u.density * u.velocity * u.length * u.length * self.spec.slab
-    }
-
-    /// Error of the continuum's volume against what it began with and its copy was given since, relative.
-    pub fn volume_error(&self) -> f64 {
-        let now = self.collapse.flow().volume();
-        let start = now / (1.0 + self.collapse.volume_drift());
-        (now - start - self.account.copied) / start
-    }
-
-    /// Mass of grains and of continuum that totals count, over that of all grains at the start, less 1: what the
-    /// handshake surface gained or lost by differences of both sides' motion.
-    pub fn mass_error(&self, simulation: &Simulation) -> f64 {
-        let mut masses: Vec<(u32, f64)> = simulation
-            .held(|_| true)
-            .filter(|g| self.counts(g.id))
-            .map(|g| (g.id, g.mass))
-            .collect();
-        masses.sort_unstable_by_key(|m| m.0);
-        let grains: f64 = masses.iter().map(|m| m.1).sum();
-        let solid: f64 = self.parcels().iter().map(|[_, volume]| volume).sum();
-        let continuum = solid * self.spec.case.rheology.grain_density;
-        (grains + continuum) / self.account.mass - 1.0
-    }
-
-    /// The continuum behind the handshake surface as parcels: places along x (m) and volumes of grains in them (m³).
-    pub fn parcels(&self) -> Vec<[f64; 2]> {
-        const PARTS: usize = 4;
-        let [columns, rows] = self.cells.counts;
-        let places = &self.held.handshake;
-        let (h, solid) = (self.cells.spacing, self.spec.case.rheology.solid_fraction);
-        let volume = self.cells.volume() * solid / PARTS as f64;
-        let fractions = &self.collapse.flow().state().fractions;
-        let mut parcels = Vec::new();
-        for (k, &end) in places.iter().enumerate().take(rows) {
-            for i in 0..columns {
-                let fraction = fractions[i + columns * k];
-                if fraction <= 0.0 {
-                    continue;
-                }
-                for part in 0..PARTS {
-                    let low = (i as f64 + part as f64 / PARTS as f64) * h;
-                    let width = h / PARTS as f64;
-                    let share = ((end - low) / width).clamp(0.0, 1.0);
-                    if share > 0.0 {
-                        parcels.push([low + 0.5 * share * width, fraction * share * volume]);
-                    }
-                }
-            }
-        }
-        parcels
     }
 
     /// Where the handshake surface is, row by row (m): where grains of nearby labels have moved to.

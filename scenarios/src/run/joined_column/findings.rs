@@ -195,7 +195,7 @@ impl JoinedColumn<'_> {
             summary.cost.cell_steps_per_s = monitors.steps[1] / summary.cost.wall_s;
         }
         summary.model.grains = now as u64;
-        summary.model.cells = edge.cells().len() as u64;
+        summary.model.cells = edge.cells().count() as u64;
         summary.put(
             "grain_steps_share",
             Quantity::new(now as f64 / before as f64, "1")
