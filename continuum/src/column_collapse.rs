@@ -270,6 +270,11 @@ impl Collapse {
         &self.flow
     }
 
+    /// The flow, in natural units, to be acted on from outside.
+    pub fn flow_mut(&mut self) -> &mut SurfaceFlow<MuI> {
+        &mut self.flow
+    }
+
     /// The flow by itself, in natural units.
     pub fn into_flow(self) -> SurfaceFlow<MuI> {
         self.flow

@@ -14,6 +14,7 @@ mod flow;
 mod fraction;
 mod ground;
 mod operators;
+mod outside;
 pub mod plane;
 mod topology;
 mod transport;
@@ -24,3 +25,4 @@ pub use flow::{
     SpaceFlow, SpaceState, Spent, SurfaceFlow, SurfaceOptions, SurfaceState, SurfaceStep,
 };
 pub use ground::{Contact, Terrain};
+pub use outside::Outside;

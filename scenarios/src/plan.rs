@@ -33,6 +33,10 @@ pub fn plan(scene: &Scene) -> Result<String, Failure> {
         SceneBody::Collapse(body) if body.model == CollapseModel::Dem => {
             world::plan(scene, body.as_ref())
         }
+        SceneBody::Collapse(body) if body.model == CollapseModel::Hybrid => world::plan(
+            scene,
+            &run::joined_column::JoinedColumn::new(body, &scene.origin),
+        ),
         SceneBody::Collapse(body) => {
             let ground = run::collapse_ground::ground(body, &scene.origin)?;
             Ok(collapse::collapse(body, ground.as_ref()))

@@ -20,6 +20,7 @@ mod heap;
 pub mod impact;
 pub mod impact_scales;
 pub mod incline;
+pub mod joined_column;
 pub mod joined_incline;
 mod march_record;
 pub mod precheck;

@@ -15,6 +15,7 @@ mod cliff;
 mod collapse;
 mod collapse_grains;
 mod collapse_terrain;
+mod collapse_zones;
 mod comet;
 mod error;
 mod friction_keys;
@@ -45,6 +46,7 @@ pub use collapse::{
 };
 pub use collapse_grains::{CalibratedKind, ColumnFloorKind, ColumnGrainKeys};
 pub use collapse_terrain::{ContactKind, TerrainKeys};
+pub use collapse_zones::{ColumnOverlapKeys, ColumnZoneKeys, DENSE};
 pub use comet::{CometBlockKeys, CometKeys, MixKind, Softness};
 pub use error::SceneError;
 pub use grains::GrainsScene;

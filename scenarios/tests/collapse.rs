@@ -269,7 +269,6 @@ fn bad_collapses_are_refused_by_key() {
         ("solver.courant=1.5", "solver.courant", "1"),
         ("rheology.mu_2=0.1", "rheology.mu_2", "0.32"),
         ("aspect=0", "aspect", "0.05"),
-        ("model=\"hybrid\"", "model", "one flat edge"),
         ("grains.floor=\"sand\"", "grains.floor", "smooth"),
         (
             "contact.youngs_modulus=1e6",

@@ -4,7 +4,7 @@
 
 mod command;
 
-use command::{SMALL_HYBRID, colluvium, hash, succeed};
+use command::{SMALL_HYBRID, SMALL_JOINED_COLUMN, colluvium, hash, succeed};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
@@ -156,6 +156,13 @@ fn a_killed_incline_goes_on() {
 #[test]
 fn a_killed_hybrid_goes_on_in_the_middle_of_an_exchange() {
     killed_and_whole("incline", SMALL_HYBRID, 9, 3);
+}
+
+/// Its edge moves with the grains; everything of it lives in the recipe's memory.
+#[test]
+fn a_killed_joined_column_goes_on_in_the_middle_of_an_exchange() {
+    let sets = [SMALL_JOINED_COLUMN, &["duration_scaled=1"]].concat();
+    killed_and_whole("column-collapse", &sets, 11, 2);
 }
 
 #[test]

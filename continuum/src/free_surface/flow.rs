@@ -13,6 +13,7 @@ use super::ground::contact::sliding_place;
 use super::ground::faces::faces_over;
 use super::ground::{Contact, DUST, Ground, Terrain};
 use super::operators::{Material, Operators, POINTS, points_of};
+use super::outside::Outside;
 use super::plane::Plane;
 use super::topology::{NONE, Topology};
 use super::transport::{MASSLESS, Motion, Transport};
@@ -195,6 +196,10 @@ pub struct SurfaceFlow<
     transport: Transport<D>,
     side_walls: Option<SideWalls>,
     bed: Option<Bed<D, C, V>>,
+    /// What acts from outside; so far in a plane only.
+    outside: Option<Outside>,
+    /// Impulse of forces from outside that nobody has taken.
+    untaken: [f64; DIMENSIONS],
     /// Matter and ground together.
     filled: Vec<f64>,
     solver: Option<(Vec<usize>, PrimalDual<C>)>,
@@ -230,6 +235,27 @@ impl<R: Rheology> SurfaceFlow<R> {
         options: SurfaceOptions,
     ) -> Result<Self, Error> {
         Self::filling(grid, fractions, rheology, acceleration, options)
+    }
+
+    /// From now on this acts from outside; on a flow over ground nothing does.
+    ///
+    /// # Errors
+    /// What belongs to another grid, or is out of range.
+    pub fn set_outside(&mut self, outside: Outside) -> Result<(), Error> {
+        outside.validate(self.topology.cells())?;
+        self.outside = Some(outside);
+        Ok(())
+    }
+
+    /// What acts from outside.
+    pub fn outside(&self) -> Option<&Outside> {
+        self.outside.as_ref()
+    }
+
+    /// Impulse of forces from outside on cells without a velocity of their own since the last call; forgotten
+    /// by it.
+    pub fn take_untaken(&mut self) -> [f64; DIMENSIONS] {
+        std::mem::take(&mut self.untaken)
     }
 
     /// Material at rest over ground, in natural units. Fractions are of whole cells, and at most what the
@@ -334,6 +360,8 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             transport: Transport::default(),
             side_walls: None,
             bed: None,
+            outside: None,
+            untaken: [0.0; DIMENSIONS],
             filled: Vec::new(),
             solver: None,
             unknowns: FlowState {
@@ -687,6 +715,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             faces: &faces,
             side_walls: self.side_walls,
             acceleration,
+            outside: self.outside.as_ref(),
         };
         let Operators {
             discretisation,
@@ -734,6 +763,12 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         record.newton_iterations += report.iterations;
         record.residuals = report.residuals;
         if report.converged {
+            if let Some(outside) = &self.outside {
+                let rates = outside.untaken(&faces, &self.topology);
+                for (sum, rate) in self.untaken.iter_mut().zip(rates) {
+                    *sum += rate * dt;
+                }
+            }
             self.scatter(&faces, &places, dt);
         }
         Ok(report.converged)
@@ -744,6 +779,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
     fn falls_freely(&mut self, discretisation: &Discretisation<D, C, V>, dt: f64) -> bool {
         let unknowns = &mut self.unknowns;
         let is_loose = self.bed.is_none()
+            && self.outside.is_none()
             && unknowns.p.iter().all(|p| *p <= f64::MIN_POSITIVE)
             && unknowns.s.iter().all(|s| *s == [0.0; C])
             && self.rheology.threshold(1.0, 0.0).stress == 0.0

@@ -9,6 +9,7 @@
 
 use super::faces::{ACTIVE, ALIKE, Face, Faces, weight_onto};
 use super::fraction::volume_in;
+use super::outside::Outside;
 use super::plane::Plane;
 use super::topology::{NONE, Topology};
 use crate::discretisation::{
@@ -44,6 +45,8 @@ pub(crate) struct Material<'a, const D: usize = DIMENSIONS> {
     pub side_walls: Option<SideWalls>,
     /// Acceleration by gravity.
     pub acceleration: [f64; D],
+    /// What lies beyond the surface, if it is not free.
+    pub outside: Option<&'a Outside>,
 }
 
 /// The operators, and the place of each quadrature point on the grid: cell times [`points_of`] plus
@@ -74,6 +77,9 @@ impl<const D: usize> Material<'_, D> {
             if fraction > EMPTY {
                 self.add_points(cell, &mut parts.points, &mut places);
             }
+        }
+        if let Some(outside) = self.outside {
+            outside.lay(&mut parts, &places, self.faces, self.topology);
         }
         Operators {
             discretisation: Discretisation::of_parts(self.grid.clone(), parts),
@@ -165,9 +171,13 @@ impl<const D: usize> Material<'_, D> {
                     parts
                         .divergence
                         .push((p, j, outwards * self.grid.face_area(axis)));
-                    parts
-                        .gradient
-                        .push(outwards * parts.mass[j] / (distance * spacing));
+                    let push = outwards * parts.mass[j] / (distance * spacing);
+                    parts.gradient.push(push);
+                    if let Some(outside) = self.outside
+                        && self.faces.pressure[other] == NONE
+                    {
+                        parts.boundary_load[j] -= push * outside.on_surface(cell, other, distance);
+                    }
                 }
             }
         }
@@ -426,6 +436,14 @@ impl<const D: usize> Material<'_, D> {
         }
     }
 
+    /// What the pressure on a surface that is not free adds to the one extrapolated through it into a cell, by
+    /// p = f p_active + (1 − f) p_surface.
+    fn pressure_beyond(&self, cell: usize, factor: f64) -> f64 {
+        self.outside.map_or(0.0, |outside| {
+            (1.0 - factor) * outside.on_surface(cell, cell, 0.0)
+        })
+    }
+
     /// Adds the linear interpolation of pressure to a corner. On a wall it is extrapolated from the
     /// two cells above it; under a thin layer it is the layer's weight.
     fn add_corner_pressure<const C: usize, const V: usize>(
@@ -447,6 +465,7 @@ impl<const D: usize> Material<'_, D> {
                     .flatten()
                 {
                     point.add_pressure(p, share * factor);
+                    point.pressure_offset += share * self.pressure_beyond(cell, factor);
                 }
                 continue;
             };
@@ -455,7 +474,7 @@ impl<const D: usize> Material<'_, D> {
             if self.fractions[cell] <= ACTIVE {
                 let weight =
                     weight_onto(&self.acceleration, axis, side) * self.fractions[cell] * spacing;
-                point.pressure_offset += share * weight;
+                point.pressure_offset += share * (weight + self.pressure_beyond(cell, 0.0));
                 continue;
             }
             let first = self.faces.pressure[cell];
@@ -470,6 +489,11 @@ impl<const D: usize> Material<'_, D> {
             point.add_pressure(first, 1.5 * share);
             if let Some((p, factor)) = second {
                 point.add_pressure(p, -0.5 * share * factor);
+                let next = self.topology.cell_neighbours[cell][axis][1 - side];
+                if next != NONE {
+                    let beyond = self.pressure_beyond(next, factor);
+                    point.pressure_offset -= 0.5 * share * beyond;
+                }
             }
         }
     }

@@ -29,6 +29,7 @@ mod far_side;
 pub mod force_blending;
 pub mod joined_incline;
 mod ledger;
+pub mod material_edge;
 mod monitors;
 mod record;
 mod settings;

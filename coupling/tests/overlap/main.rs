@@ -8,6 +8,7 @@ mod books;
 mod comparison;
 mod incline;
 mod joined;
+mod material;
 mod motion;
 mod pulse;
 mod rest;

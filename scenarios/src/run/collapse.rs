@@ -3,7 +3,7 @@
 mod beside_continuum;
 
 use super::bagnold::failure;
-use super::{Findings, Under, collapse_ground, world};
+use super::{Findings, Under, collapse_ground, joined_column, world};
 use crate::cost::Cost;
 use crate::failure::Failure;
 use crate::frames;
@@ -78,8 +78,10 @@ pub fn options(scene: &CollapseScene) -> SurfaceOptions {
 
 /// Checks the case and the settings before anything is written.
 pub(super) fn check(scene: &Scene, body: &CollapseScene) -> Result<(), Failure> {
-    if body.model == CollapseModel::Dem {
-        return world::course::check(scene, body);
+    match body.model {
+        CollapseModel::Dem => return world::course::check(scene, body),
+        CollapseModel::Hybrid => return joined_column::check(scene, body),
+        CollapseModel::Continuum => {}
     }
     let named =
         |error: colluvium_continuum::Error| Failure::Input(format!("{}: {error}", scene.origin));
@@ -252,6 +254,9 @@ pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, 
         let mut findings = world::course::run(scene, under)?;
         beside_continuum::set_beside(scene, &mut findings, under)?;
         return Ok(findings);
+    }
+    if scene.model == CollapseModel::Hybrid {
+        return joined_column::run(scene, under);
     }
     let mut collapse = begun(scene, &under.scene.origin)?;
     let unit = collapse.units().time();

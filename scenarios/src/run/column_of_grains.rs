@@ -8,7 +8,7 @@ use super::world::workshop::{Surroundings, softened, step_for};
 use super::world::{Course, Expected, Ran, Recipe, Workshop, World, fragments};
 use crate::failure::Failure;
 use crate::scene::world::{Materials, OutputKeys, Place, StepKeys};
-use crate::scene::{CollapseScene, ColumnFloorKind, LawKeys, layers};
+use crate::scene::{CollapseScene, ColumnFloorKind, DENSE, LawKeys, layers};
 use crate::summary::{Quantity, Summary};
 use crate::table::Table;
 use colluvium_dem::preparation::{Amount, Packing, Relaxation, Rest, solid_fraction};
@@ -20,12 +20,10 @@ use std::f64::consts::PI;
 const LOOSE: f64 = 0.25;
 /// Solid fraction that more than fills the column: the rest is cut off.
 const OVERFULL: f64 = 0.64;
-/// Solid fraction that a settled column is expected to have, for the plan.
-const DENSE: f64 = 0.57;
 /// Stiffness of the grains while they fall, over their own: steps are three times as long.
 const SOFT: f64 = 0.1;
 /// Fixed grains on a square diameter of the floor, and the thickness of their layer over d.
-const FLOOR: [f64; 2] = [0.6, 1.25];
+pub(super) const FLOOR: [f64; 2] = [0.6, 1.25];
 /// A column that is about to fall need not be quieter than this.
 const QUIET: Rest = Rest {
     kinetic: 1e-5,
@@ -34,33 +32,33 @@ const QUIET: Rest = Rest {
 /// Times √(h/g) that a cloud of height h takes to fall and settle, for the plan (measured: 2.8).
 const SETTLING: f64 = 3.5;
 /// Instants of the front over the duration, and fronts between two profiles.
-const FRONTS: f64 = 240.0;
-const PROFILE_EVERY: usize = 10;
+pub(super) const FRONTS: f64 = 240.0;
+pub(super) const PROFILE_EVERY: usize = 10;
 /// Kinetic energy over m g d a grain below which a heap rests, and for how many looks in a row: what is left
 /// then are elastic swings of the whole, which fade slowly and move no grain past another.
-const STILL: f64 = 1e-4;
-const STILL_LOOKS: f64 = 3.0;
+pub(super) const STILL: f64 = 1e-4;
+pub(super) const STILL_LOOKS: f64 = 3.0;
 /// Times √(H/g) before which a column that has just been let go is not looked at for rest.
-const BEGUN: f64 = 1.0;
+pub(super) const BEGUN: f64 = 1.0;
 
 impl CollapseScene {
-    fn time_unit(&self) -> f64 {
+    pub(super) fn time_unit(&self) -> f64 {
         (self.height / self.gravity).sqrt()
     }
 
-    fn duration(&self) -> f64 {
+    pub(super) fn duration(&self) -> f64 {
         self.duration_scaled * self.time_unit()
     }
 
-    fn slab(&self) -> f64 {
+    pub(super) fn slab(&self) -> f64 {
         self.scale * self.grains.width_diameters * self.grains.diameter
     }
 
-    fn length(&self) -> f64 {
+    pub(super) fn length(&self) -> f64 {
         self.grid.length_scaled * self.height
     }
 
-    fn grain_volume(&self) -> f64 {
+    pub(super) fn grain_volume(&self) -> f64 {
         PI / 6.0 * self.grains.diameter.powi(3)
     }
 
@@ -69,7 +67,7 @@ impl CollapseScene {
     }
 
     /// Columns a diameter wide over the whole floor.
-    fn heap_axis(&self) -> HeapAxis {
+    pub(super) fn heap_axis(&self) -> HeapAxis {
         HeapAxis {
             start: 0.0,
             spacing: self.grains.diameter,
@@ -154,7 +152,7 @@ impl CollapseScene {
     }
 
     /// The middle of the column.
-    fn middle(&self) -> Region {
+    pub(super) fn middle(&self) -> Region {
         let x = |share: f64| share * self.width();
         Region::Block {
             lower: Vector3::new(x(0.1), 0.0, 0.1 * self.height),
@@ -163,7 +161,12 @@ impl CollapseScene {
     }
 
     /// Heights of the heap now (m), of the grains that `f` takes, in a slab `width` wide.
-    fn heights(&self, grains: &[Grain], base: f64, f: impl Fn(&Grain) -> bool) -> Vec<f64> {
+    pub(super) fn heights(
+        &self,
+        grains: &[Grain],
+        base: f64,
+        f: impl Fn(&Grain) -> bool,
+    ) -> Vec<f64> {
         let free = grains.iter().filter(|g| !g.fixed && f(g));
         let rows = free.map(|g| [g.position.x, g.volume()]);
         self.heap_axis().heights(rows, base)
@@ -182,7 +185,7 @@ impl CollapseScene {
         }
     }
 
-    fn threshold(&self) -> f64 {
+    pub(super) fn threshold(&self) -> f64 {
         self.front_height_scaled * self.height
     }
 }
@@ -241,6 +244,8 @@ impl Recipe for CollapseScene {
             "grains.calibrated",
             "timestep.seconds",
             "timestep.safety",
+            "zones",
+            "overlap",
         ] {
             layers::remove(&mut keys, later);
         }

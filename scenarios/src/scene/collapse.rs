@@ -1,7 +1,10 @@
 //! Keys of the collapse of a column.
 
 use super::world::{OutputKeys, StepKeys};
-use super::{ColumnGrainKeys, FrictionLaw, LawKeys, RheologyKeys, SceneError, TerrainKeys};
+use super::{
+    ColumnGrainKeys, ColumnOverlapKeys, ColumnZoneKeys, FrictionLaw, LawKeys, RheologyKeys,
+    SceneError, TerrainKeys,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -55,6 +58,12 @@ pub struct CollapseScene {
     /// What a run of grains writes.
     #[serde(default)]
     pub output: OutputKeys,
+    /// Where there are grains, with model = "hybrid".
+    #[serde(default)]
+    pub zones: ColumnZoneKeys,
+    /// How they are joined to the continuum behind them.
+    #[serde(default)]
+    pub overlap: ColumnOverlapKeys,
 }
 
 /// What the material is made of.
@@ -141,15 +150,7 @@ impl CollapseScene {
             })
         };
         match self.model {
-            CollapseModel::Hybrid => {
-                return refused(
-                    "model",
-                    "hybrid".into(),
-                    "continuum or dem: grains and a continuum are joined so far at one flat edge that stands still \
-                     (incline), and the edge of a collapse moves"
-                        .into(),
-                );
-            }
+            CollapseModel::Hybrid => return self.check_zones(origin),
             CollapseModel::Dem => return self.check_grains(origin),
             CollapseModel::Continuum => {}
         }

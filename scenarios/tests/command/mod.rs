@@ -18,6 +18,19 @@ pub const SMALL_HYBRID: &[&str] = &[
     "slope_degrees=33",
 ];
 
+/// Settings of the scene `column-collapse` that take seconds: grains in front of a continuum, 10 diameters high.
+pub const SMALL_JOINED_COLUMN: &[&str] = &[
+    "model=hybrid",
+    "aspect=0.36",
+    "duration_scaled=4",
+    "grid.cells=64",
+    "grains.diameter=0.1",
+    "grains.width_diameters=4",
+    "grains.stiffness_scaled=2e3",
+    "grains.packing=small",
+    "output.pictures=0",
+];
+
 /// Runs `colluvium` in a folder.
 pub fn colluvium(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_colluvium"))

@@ -1,0 +1,108 @@
+//! A column whose face is not free: other matter leans on it.
+
+#![allow(clippy::unwrap_used)] // a test may panic
+
+use colluvium_continuum::Error;
+use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
+use colluvium_continuum::free_surface::{Outside, SurfaceOptions};
+use colluvium_continuum::rheology::MuI;
+
+/// Cells over the height, which is the width; in natural units the column is 1 high.
+const ROWS: usize = 16;
+const COLUMNS: usize = 40;
+
+fn column() -> Collapse {
+    let case = CollapseCase {
+        aspect: 1.0,
+        height: 2.0,
+        gravity: 9.81,
+        rheology: MuI::new(0.5, 0.8, 0.4, 0.05, 0.6, 2500.0),
+        cells: COLUMNS,
+        length_scaled: COLUMNS as f64 / ROWS as f64,
+        overhang_degrees: 0.0,
+    };
+    Collapse::new(&case, &SurfaceOptions::default()).unwrap()
+}
+
+/// Matter outside that bears its weight, with σ_xx = K σ_zz, on the face and, where asked, in the last 6 cells
+/// of the column.
+fn leaning(collapse: &Collapse, ratio: f64, shared: bool) -> Outside {
+    let cells = collapse.flow().state().fractions.len();
+    let mut outside = Outside::nothing(cells);
+    for cell in 0..cells {
+        let (i, k) = (cell % COLUMNS, cell / COLUMNS);
+        let weight = 1.0 - (k as f64 + 0.5) / ROWS as f64;
+        if weight > 0.0 {
+            outside.pressure[cell] = 0.5 * (1.0 + ratio) * weight;
+            outside.stress[cell] = [0.5 * (1.0 - ratio) * weight, 0.0];
+            outside.cover[cell] = 1.0;
+            if shared && i < ROWS {
+                outside.share[cell] = ((i as f64 + 7.0 - ROWS as f64) / 7.0).max(0.0);
+            }
+        }
+    }
+    outside
+}
+
+/// Largest speed over √(g H) after a time of √(H/g), and the mean pressure over the weight above in the inner half.
+fn after(mut collapse: Collapse, outside: Option<Outside>) -> [f64; 2] {
+    if let Some(outside) = outside {
+        collapse.flow_mut().set_outside(outside).unwrap();
+    }
+    let end = collapse.units().time();
+    let mut speed = 0.0;
+    while collapse.time() < end * (1.0 - 1e-9) {
+        speed = collapse.step(end).unwrap().max_speed;
+    }
+    let state = collapse.flow().state();
+    let (mut pressure, mut weight) = (0.0, 0.0);
+    for k in 0..ROWS - 1 {
+        for i in 0..ROWS / 2 {
+            pressure += state.pressure[i + COLUMNS * k];
+            weight += 1.0 - (k as f64 + 0.5) / ROWS as f64;
+        }
+    }
+    [speed, pressure / weight]
+}
+
+#[test]
+fn a_face_that_is_leaned_on_stands() {
+    let held = leaning(&column(), 1.0, false);
+    let [speed, pressure] = after(column(), Some(held));
+    println!("level pressure: speed {speed:.1e}, pressure {pressure:.9}");
+    assert!(speed < 1e-9 && (pressure - 1.0).abs() < 1e-9);
+    // What nobody leans on falls.
+    let [speed, _] = after(column(), None);
+    println!("nobody: speed {speed:.3}");
+    assert!(speed > 0.2, "{speed}");
+    // Nor does a pressure without a cover hold it.
+    let mut free = leaning(&column(), 1.0, false);
+    free.cover.fill(0.0);
+    assert_eq!(after(column(), Some(free))[0], speed);
+}
+
+/// Within yield a smaller thrust carries the column too: σ_xx = 0.6 σ_zz, with the deviatoric stress that goes with it.
+#[test]
+fn a_thrust_within_yield_carries_the_column_and_a_smaller_one_does_not() {
+    let [speed, pressure] = after(column(), Some(leaning(&column(), 0.6, true)));
+    println!("K = 0.6: speed {speed:.1e}, pressure {pressure:.4}");
+    assert!(speed < 1e-3, "{speed}");
+    // Active failure at K = (1 - μ)/(1 + μ) = 1/3.
+    let [falls, _] = after(column(), Some(leaning(&column(), 0.1, true)));
+    println!("K = 0.1: speed {falls:.3}");
+    assert!(falls > 0.01 && falls > 20.0 * speed, "{falls}");
+}
+
+#[test]
+fn what_does_not_fit_is_refused() {
+    let mut collapse = column();
+    let few = collapse.flow_mut().set_outside(Outside::nothing(3));
+    assert!(matches!(few, Err(Error::ForeignState { found: 3, .. })));
+    let mut outside = leaning(&collapse, 1.0, false);
+    outside.share[0] = 1.5;
+    let refused = collapse.flow_mut().set_outside(outside.clone());
+    assert!(refused.unwrap_err().to_string().contains("outside.share"));
+    outside.share[0] = 0.0;
+    outside.force[0] = [f64::NAN, 0.0];
+    assert!(collapse.flow_mut().set_outside(outside).is_err());
+}

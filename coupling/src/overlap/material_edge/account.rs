@@ -1,0 +1,241 @@
+//! What grains and continuum give each other, and what the monitors say.
+
+/// Momentum along x and z since the start (N s), and masses (kg).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Account {
+    /// Of grains and continuum together at the start, each counted on its side of the handshake surface.
+    pub mass: f64,
+    /// Of the grains when the edge was cut, with what walls had taken.
+    pub grains_before: [f64; 2],
+    /// Of the continuum then.
+    pub continuum_before: [f64; 2],
+    /// Weight of the grains.
+    pub weight: [f64; 2],
+    /// Of the continuum's traction on the grains.
+    pub traction: [f64; 2],
+    /// Of the impedance on the grains.
+    pub impedance: [f64; 2],
+    /// Of the relaxation on the grains; the continuum takes the opposite.
+    pub relaxation: [f64; 2],
+    /// Of the relaxation on the continuum.
+    pub answer: [f64; 2],
+    /// That the copy was given when it was made anew from the grains.
+    pub following: [f64; 2],
+    /// Of the relaxation on cells that had no velocity to take it.
+    pub untaken: [f64; 2],
+    /// Weight of the continuum, copy included.
+    pub continuum_weight: [f64; 2],
+    /// Volume that the copy was given when it was made anew, in the continuum's own unit.
+    pub copied: f64,
+}
+
+/// Numbers of an account.
+pub const NUMBERS: usize = 22;
+
+impl Account {
+    /// All of it in a row of numbers.
+    pub fn numbers(&self) -> [f64; NUMBERS] {
+        let rows = self.rows();
+        std::array::from_fn(|k| match k.checked_sub(2) {
+            None => [self.mass, self.copied][k],
+            Some(k) => rows[k / 2][k % 2],
+        })
+    }
+
+    fn rows(&self) -> [[f64; 2]; 10] {
+        [
+            self.grains_before,
+            self.continuum_before,
+            self.weight,
+            self.traction,
+            self.impedance,
+            self.relaxation,
+            self.answer,
+            self.following,
+            self.untaken,
+            self.continuum_weight,
+        ]
+    }
+
+    /// From such numbers.
+    pub fn of(n: &[f64; NUMBERS]) -> Self {
+        let row = |k: usize| [n[2 + 2 * k], n[3 + 2 * k]];
+        Self {
+            mass: n[0],
+            copied: n[1],
+            grains_before: row(0),
+            continuum_before: row(1),
+            weight: row(2),
+            traction: row(3),
+            impedance: row(4),
+            relaxation: row(5),
+            answer: row(6),
+            following: row(7),
+            untaken: row(8),
+            continuum_weight: row(9),
+        }
+    }
+
+    /// Error of the grains' account over its largest entry, for their momentum now with what walls have taken.
+    pub fn grains_error(&self, now: [f64; 2]) -> f64 {
+        let mut largest: f64 = 0.0;
+        let misses = [0, 1].map(|axis| {
+            let entries = [
+                self.weight[axis],
+                self.traction[axis],
+                self.impedance[axis],
+                self.relaxation[axis],
+            ];
+            let change = now[axis] - self.grains_before[axis];
+            let all = entries
+                .iter()
+                .copied()
+                .chain([now[axis], self.grains_before[axis]]);
+            largest = all.fold(largest, |most, entry| most.max(entry.abs()));
+            change - entries.iter().sum::<f64>()
+        });
+        quotient(misses, largest)
+    }
+
+    /// Error of what the relaxation gave to both sides, `owed` being what the continuum has still to take, over the
+    /// largest entry.
+    pub fn exchange_error(&self, owed: [f64; 2]) -> f64 {
+        let misses = [0, 1].map(|axis| self.relaxation[axis] + self.answer[axis] + owed[axis]);
+        let entries = self.relaxation.iter().chain(&self.weight);
+        quotient(
+            misses,
+            entries.fold(0.0, |most, entry| most.max(entry.abs())),
+        )
+    }
+
+    /// What the continuum has had from walls and from the stress on its surface: what is left of its momentum now
+    /// (N s).
+    pub fn from_walls_and_surface(&self, now: [f64; 2]) -> [f64; 2] {
+        [0, 1].map(|axis| {
+            now[axis]
+                - self.continuum_before[axis]
+                - self.continuum_weight[axis]
+                - self.answer[axis]
+                - self.following[axis]
+                + self.untaken[axis]
+        })
+    }
+}
+
+fn quotient(misses: [f64; 2], largest: f64) -> f64 {
+    let most = misses[0].abs().max(misses[1].abs());
+    if largest > 0.0 { most / largest } else { most }
+}
+
+/// Sums over the exchanges for means in time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Monitors {
+    /// Exchanges seen.
+    pub exchanges: f64,
+    /// Σ of the rms slip between both sides at the handshake surface (m/s).
+    pub slip: f64,
+    /// Largest of these (m/s).
+    pub largest_slip: f64,
+    /// Σ of the force of the grains' σ_xx through the handshake surface, and of the continuum's (N).
+    pub force: [f64; 2],
+    /// Σ of the grains' mass in the full cells of the overlap, over that of the continuum in them.
+    pub packing: f64,
+    /// Σ |impulse| of the relaxation, cell by cell, and of the traction, row by row (N s).
+    pub impulse: [f64; 2],
+    /// Most grains beyond the edge by more than a diameter.
+    pub escaped: f64,
+    /// Steps of the continuum, and active cells in them.
+    pub steps: [f64; 2],
+    /// Largest residual of the continuum's momentum.
+    pub residual: f64,
+}
+
+/// Numbers of the monitors.
+pub const MONITORED: usize = 12;
+
+impl Monitors {
+    /// All of it in a row of numbers.
+    pub fn numbers(&self) -> [f64; MONITORED] {
+        [
+            self.exchanges,
+            self.slip,
+            self.largest_slip,
+            self.force[0],
+            self.force[1],
+            self.packing,
+            self.impulse[0],
+            self.impulse[1],
+            self.escaped,
+            self.steps[0],
+            self.steps[1],
+            self.residual,
+        ]
+    }
+
+    /// From such numbers.
+    pub fn of(n: &[f64; MONITORED]) -> Self {
+        Self {
+            exchanges: n[0],
+            slip: n[1],
+            largest_slip: n[2],
+            force: [n[3], n[4]],
+            packing: n[5],
+            impulse: [n[6], n[7]],
+            escaped: n[8],
+            steps: [n[9], n[10]],
+            residual: n[11],
+        }
+    }
+
+    /// Mean rms slip at the handshake surface (m/s).
+    pub fn mean_slip(&self) -> f64 {
+        self.slip / self.exchanges.max(1.0)
+    }
+
+    /// Force of the grains' σ_xx over that of the continuum's at the handshake surface.
+    pub fn force_ratio(&self) -> f64 {
+        self.force[0] / self.force[1]
+    }
+
+    /// Mass of the grains in the overlap over that of the continuum there.
+    pub fn packing_ratio(&self) -> f64 {
+        self.packing / self.exchanges.max(1.0)
+    }
+
+    /// Impulse of the relaxation over that of the traction.
+    pub fn relaxation_share(&self) -> f64 {
+        self.impulse[0] / self.impulse[1]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn accounts_and_monitors_come_back_from_their_numbers() {
+        let numbers: [f64; NUMBERS] = std::array::from_fn(|k| k as f64 + 0.5);
+        assert_eq!(Account::of(&numbers).numbers(), numbers);
+        let numbers: [f64; MONITORED] = std::array::from_fn(|k| k as f64 + 0.5);
+        assert_eq!(Monitors::of(&numbers).numbers(), numbers);
+    }
+
+    #[test]
+    fn an_account_that_lacks_an_entry_does_not_close() {
+        let mut account = Account {
+            grains_before: [1.0, 2.0],
+            weight: [0.0, -8.0],
+            traction: [3.0, 0.5],
+            impedance: [-1.0, 0.0],
+            relaxation: [0.25, 0.25],
+            ..Account::default()
+        };
+        let now = [3.25, -5.25];
+        assert_eq!(account.grains_error(now), 0.0);
+        account.impedance = [0.0; 2];
+        assert_eq!(account.grains_error(now), 1.0 / 8.0);
+        account.answer = [-0.25, -0.125];
+        assert_eq!(account.exchange_error([0.0, -0.125]), 0.0);
+        assert!(account.exchange_error([0.0; 2]) > 0.01);
+    }
+}

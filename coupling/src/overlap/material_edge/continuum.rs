@@ -1,0 +1,139 @@
+//! The continuum's side in SI units, cell by cell.
+
+use super::cells::Cells;
+use colluvium_continuum::column_collapse::Collapse;
+use colluvium_continuum::free_surface::SurfaceState;
+
+/// Cells fuller than this have a pressure of their own.
+const FULL: f64 = 0.5;
+/// Most by which the pressure of a cell at the surface is taken to be below the mean over its filled part.
+const LARGEST_FACTOR: f64 = 2.0;
+
+/// Fields of all cells (SI).
+#[derive(Clone, Debug, Default)]
+pub struct View {
+    /// Filled part.
+    pub fraction: Vec<f64>,
+    /// Velocity along x and z (m/s).
+    pub velocity: Vec<[f64; 2]>,
+    /// Pressure (Pa); negative where a cell has none.
+    pub pressure: Vec<f64>,
+    /// ((σ_xx − σ_zz)/2, σ_xz), positive in tension (Pa).
+    pub stress: Vec<[f64; 2]>,
+}
+
+impl View {
+    /// Looks at a collapse.
+    pub fn look(&mut self, collapse: &Collapse, cells: &Cells) {
+        let (state, units) = (collapse.flow().state(), collapse.units());
+        let points = state.stress.len() / state.fractions.len();
+        let (columns, stress) = (cells.counts[0], units.stress());
+        self.fraction.clone_from(&state.fractions);
+        self.pressure.clear();
+        self.pressure
+            .extend(state.pressure.iter().map(|p| p * stress));
+        self.velocity.clear();
+        self.stress.clear();
+        for cell in 0..cells.count() {
+            let (i, k) = (cell % columns, cell / columns);
+            let low = i + (columns + 1) * k;
+            let across = state.velocity[0][low] + state.velocity[0][low + 1];
+            let up = state.velocity[1][cell] + state.velocity[1][cell + columns];
+            self.velocity
+                .push([across, up].map(|sum| 0.5 * sum * units.velocity));
+            let own = &state.stress[cell * points..(cell + 1) * points];
+            self.stress.push(
+                [0, 1].map(|c| own.iter().map(|s| s[c]).sum::<f64>() / points as f64 * stress),
+            );
+        }
+    }
+
+    /// Whether a cell has a pressure of its own.
+    pub fn is_full(&self, cell: usize) -> bool {
+        self.fraction[cell] > FULL
+    }
+
+    /// Velocity at a place from the full cells around it; none without any.
+    pub fn velocity_at(&self, hats: &[(usize, f64); 4]) -> Option<[f64; 2]> {
+        let (mut sum, mut weight) = ([0.0; 2], 0.0);
+        for &(cell, hat) in hats.iter().filter(|(cell, _)| self.is_full(*cell)) {
+            weight += hat;
+            for (sum, u) in sum.iter_mut().zip(self.velocity[cell]) {
+                *sum += hat * u;
+            }
+        }
+        (weight > 0.0).then(|| sum.map(|s| s / weight))
+    }
+
+    /// Filled part, σ_xx, σ_zz, σ_xz (Pa) and velocity at a place in a row, from the cells beside it; none where
+    /// neither is full.
+    pub fn across(&self, cells: &Cells, x: f64, row: usize) -> Option<(f64, [f64; 3], [f64; 2])> {
+        let columns = cells.counts[0];
+        let place = x / cells.spacing - 0.5;
+        let low = place.floor();
+        let share = place - low;
+        let index = |n: i64| (low as i64 + n).clamp(0, columns as i64 - 1) as usize + columns * row;
+        let (mut weight, mut fraction) = (0.0, 0.0);
+        let (mut sigma, mut velocity) = ([0.0; 3], [0.0; 2]);
+        for (cell, hat) in [(index(0), 1.0 - share), (index(1), share)] {
+            if !self.is_full(cell) {
+                continue;
+            }
+            weight += hat;
+            let f = self.fraction[cell].min(1.0);
+            fraction += hat * f;
+            let above = cell + columns;
+            let at_surface = above >= cells.count() || !self.is_full(above);
+            // Linear from the centre to the surface, over the filled part.
+            let factor = match at_surface {
+                true => (f / (2.0 * f - 1.0)).min(LARGEST_FACTOR),
+                false => 1.0,
+            };
+            let (p, [s, tau]) = (factor * self.pressure[cell].max(0.0), self.stress[cell]);
+            for (sum, part) in sigma.iter_mut().zip([s - p, -s - p, tau]) {
+                *sum += hat * part;
+            }
+            for (sum, u) in velocity.iter_mut().zip(self.velocity[cell]) {
+                *sum += hat * u;
+            }
+        }
+        let mean = |sum: f64| sum / weight;
+        (weight > 0.0).then(|| (mean(fraction), sigma.map(mean), velocity.map(mean)))
+    }
+}
+
+/// The state of a flow as numbers, each row with its length before it.
+pub fn write(state: &SurfaceState, put: &mut impl FnMut(&[f64])) {
+    put(&state.fractions);
+    put(&state.velocity[0]);
+    put(&state.velocity[1]);
+    put(&state.pressure);
+    put(state.stress.as_flattened());
+    put(&[
+        state.time,
+        state.velocity_time,
+        state.next_step,
+        state.steps as f64,
+    ]);
+}
+
+/// Reads it back.
+pub fn read<'a>(take: &mut impl FnMut() -> Option<&'a [f64]>) -> Option<SurfaceState> {
+    let fractions = take()?.to_vec();
+    let velocity = [take()?.to_vec(), take()?.to_vec()];
+    let pressure = take()?.to_vec();
+    let stress = take()?.as_chunks::<2>().0.to_vec();
+    let &[time, velocity_time, next_step, steps] = take()? else {
+        return None;
+    };
+    Some(SurfaceState {
+        fractions,
+        velocity,
+        pressure,
+        stress,
+        time,
+        velocity_time,
+        next_step,
+        steps: steps as usize,
+    })
+}

@@ -1,0 +1,85 @@
+//! The continuum's copy beyond the handshake surface is made anew from the grains at every exchange.
+//!
+//! What lies there is not counted, so it may be what the grains say: in each column of cells it reaches as high as
+//! the grains' volume at the continuum's solid fraction, and forward as far as labels do,
+//!
+//! ```text
+//! f = clamp(H_i/h − k, 0, 1) M(ξ < ξ_a)/M,      H_i = Σ_k M/(ρ h W)
+//! ```
+//! and its velocity follows theirs, u += (1 − e^{−Δt/t_f}) (v̄ − u), at once on faces beside no full cell. So the
+//! surface at ξ_a moves as the grains do, no matter comes loose from it, and the copy weighs what they weigh. Volume
+//! and momentum that this adds are booked.
+
+use super::MaterialEdge;
+use super::cells::over;
+
+/// Cells with less than this part of a full cell's mass in grains have no velocity to follow.
+const LEAST: f64 = 0.05;
+
+impl MaterialEdge {
+    /// Makes the copy anew, after a time (s) with the last one.
+    pub(super) fn copy_the_grains(&mut self, dt: f64) -> Result<(), super::OverlapError> {
+        let before = (self.collapse.flow().volume(), self.continuum_momentum());
+        let [columns, rows] = self.cells.counts;
+        let h = self.cells.spacing;
+        let mut state = self.collapse.flow().state().clone();
+        let full = self.spec.density() * self.cells.volume();
+        let unit = self.collapse.units().velocity;
+        let is_copy = |cell: usize| {
+            let (i, k) = (cell % columns, cell / columns);
+            i as f64 * h >= self.held.handshake[k]
+        };
+        for i in 0..columns {
+            let column = (0..rows).map(|k| self.sums.cover[i + columns * k].mass);
+            let height = column.sum::<f64>() / full;
+            let mut inside = 0.0;
+            for k in 0..rows {
+                let cell = i + columns * k;
+                let cover = &self.sums.cover[cell];
+                if cover.mass > LEAST * full {
+                    inside = over(cover.copied, cover.mass);
+                }
+                if is_copy(cell) {
+                    state.fractions[cell] = (height - k as f64).clamp(0.0, 1.0) * inside;
+                }
+            }
+        }
+        let part = -(-dt / self.spec.settings.following_time).exp_m1();
+        for axis in 0..2 {
+            let (width, step) = match axis {
+                0 => (columns + 1, 1),
+                _ => (columns, columns),
+            };
+            for (face, u) in state.velocity[axis].iter_mut().enumerate() {
+                let (i, k) = (face % width, face / width);
+                // Faces on the edges of the grid are walls.
+                if [i, k][axis] == 0 || [i, k][axis] == self.cells.counts[axis] {
+                    continue;
+                }
+                let high = i + columns * k;
+                let pair = [high - step, high];
+                if !pair.into_iter().all(is_copy) {
+                    continue;
+                }
+                let covers = pair.map(|cell| &self.sums.cover[cell]);
+                let mass = covers[0].mass + covers[1].mass;
+                if mass < LEAST * full {
+                    *u = 0.0;
+                    continue;
+                }
+                let mean = (covers[0].momentum[axis] + covers[1].momentum[axis]) / mass / unit;
+                let is_inside = pair.into_iter().any(|cell| state.fractions[cell] > 0.5);
+                *u += if is_inside { part } else { 1.0 } * (mean - *u);
+            }
+        }
+        self.collapse.set_state(state)?;
+        self.account.copied += self.collapse.flow().volume() - before.0;
+        let now = self.continuum_momentum();
+        let changes = now.iter().zip(before.1);
+        for (sum, (now, before)) in self.account.following.iter_mut().zip(changes) {
+            *sum += now - before;
+        }
+        self.view.look(&self.collapse, &self.cells);
+        Ok(())
+    }
+}

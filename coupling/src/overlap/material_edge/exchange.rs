@@ -1,0 +1,372 @@
+//! The steps: grains under what is held, and the exchange that follows so many of them.
+
+use super::cells::over;
+use super::rows::{Load, Row, bearers, displacements, slopes};
+use super::{MaterialEdge, OverlapError, label_of};
+use colluvium_dem::{GrainSample, Simulation};
+
+/// Cells with less of the mass of a full one are not spoken for by their grains.
+const LEAST_COVER: f64 = 0.3;
+/// Parts of a full cell's mass at which grains begin to cover a surface, and cover it all.
+const COVERS: [f64; 2] = [0.4, 0.7];
+/// Rows with less than this of a full row of shell hand on what presses on them: a force on few grains throws them out.
+const LEAST_ROW: f64 = 0.3;
+/// Steepest slope of the edge that its area vector follows.
+const STEEPEST: f64 = 2.0;
+/// Half width in diameters of the band of labels in which a surface is looked for.
+const BAND: f64 = 1.0;
+
+/// Room for what is formed and forgotten in a step.
+#[derive(Clone, Debug, Default)]
+pub struct Scratch {
+    near: Vec<(GrainSample, f64)>,
+    shell: Vec<Load>,
+    bearers: Vec<usize>,
+    forces: Vec<[f64; 2]>,
+    loads: Vec<colluvium_dem::Load>,
+}
+
+impl MaterialEdge {
+    /// What follows the steps of the grains for which loads are held: books what they gave, exchanges where it is
+    /// time to, and lays the next loads.
+    ///
+    /// # Errors
+    /// If the continuum's step fails or the grains refuse a load.
+    pub fn go_on(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
+        self.book_grains(simulation);
+        self.made += 1;
+        if self.made == self.loads_of_exchange {
+            self.exchange(simulation)?;
+            self.made = 0;
+            self.exchanges += 1;
+        }
+        self.lay(simulation)
+    }
+
+    /// Books the impulses of what was laid over the steps made since.
+    fn book_grains(&mut self, simulation: &Simulation) {
+        let time = self.kick + (self.steps_of_loads - 1) as f64 * self.timestep;
+        for (sum, force) in self.given.relaxation.iter_mut().zip(&self.laid.relaxation) {
+            for (sum, force) in sum.iter_mut().zip(force) {
+                *sum += force * time;
+            }
+        }
+        let gravity = simulation.gravity();
+        let mass = simulation.free_mass();
+        for axis in 0..2 {
+            let relaxation: f64 = self.laid.relaxation.iter().map(|f| f[axis]).sum();
+            self.given.traction[axis] += self.laid.traction[axis] * time;
+            self.given.impedance[axis] += self.laid.impedance[axis] * time;
+            self.account.relaxation[axis] += relaxation * time;
+            self.account.weight[axis] += mass * [gravity.x, gravity.z][axis] * time;
+        }
+    }
+
+    /// Lays the loads of the next steps.
+    pub(super) fn lay(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
+        self.kick = simulation.next_kick();
+        self.laid.clear();
+        if self.spec.settings.uncoupled {
+            return Ok(());
+        }
+        let (shell, buffer) = (self.spec.settings.shell, self.spec.settings.buffer);
+        let scratch = &mut self.scratch;
+        let reach = self.held.reach;
+        scratch.near.clear();
+        scratch.near.extend(
+            simulation
+                .held(|x| x.x < reach)
+                .filter_map(|g| label_of(&self.labels, &g).map(|label| (g, label)))
+                .filter(|(_, label)| *label < buffer),
+        );
+        // Rows may stand in another order after a restart, and sums over them end in other bits.
+        scratch.near.sort_unstable_by_key(|(grain, _)| grain.id);
+        let rows = self.held.rows.len();
+        let weight = |grain: &GrainSample, label: f64| {
+            grain.mass * ((shell - label) / shell).clamp(0.0, 1.0)
+        };
+        scratch.shell.clear();
+        scratch.shell.resize(rows, Load::default());
+        for (grain, label) in &scratch.near {
+            let q = weight(grain, *label);
+            if q <= 0.0 {
+                continue;
+            }
+            for (row, hat) in self.cells.rows(grain.position.z) {
+                let load = &mut scratch.shell[row];
+                load.weight += q * hat;
+                load.momentum[0] += q * hat * grain.velocity.x;
+                load.momentum[1] += q * hat * grain.velocity.z;
+            }
+        }
+        let full = 0.5 * self.spec.density() * shell * self.cells.spacing * self.spec.slab;
+        let least = LEAST_ROW * full;
+        bearers(&scratch.shell, least, &mut scratch.bearers);
+        scratch.forces.clear();
+        scratch.forces.resize(rows, [0.0; 2]);
+        for (k, row) in self.held.rows.iter().enumerate() {
+            let bearer = scratch.bearers[k];
+            if bearer == usize::MAX {
+                continue;
+            }
+            let load = &scratch.shell[bearer];
+            let mean = load.momentum.map(|p| over(p, load.weight));
+            let impedance = row.impedance(self.spec.settings.impedance, mean);
+            for (axis, (traction, impedance)) in row.traction.iter().zip(impedance).enumerate() {
+                scratch.forces[bearer][axis] += traction + impedance;
+                self.laid.traction[axis] += traction;
+                self.laid.impedance[axis] += impedance;
+            }
+        }
+        scratch.loads.clear();
+        for (grain, label) in &scratch.near {
+            let q = weight(grain, *label);
+            let mut force = [0.0; 2];
+            if q > 0.0 {
+                for (row, hat) in self.cells.rows(grain.position.z) {
+                    let all = scratch.shell[row].weight;
+                    if all > least {
+                        for (sum, part) in force.iter_mut().zip(scratch.forces[row]) {
+                            *sum += q * hat / all * part;
+                        }
+                    }
+                }
+            }
+            for (cell, hat) in self.cells.hats(grain.position.x, grain.position.z) {
+                let laid = &mut self.laid.relaxation[cell];
+                for axis in 0..2 {
+                    let pull = grain.mass * hat * self.held.accelerations[cell][axis];
+                    laid[axis] += pull;
+                    force[axis] += pull;
+                }
+            }
+            if force != [0.0; 2] {
+                scratch.loads.push(colluvium_dem::Load {
+                    grain: grain.id,
+                    force: [force[0], 0.0, force[1]].into(),
+                    moment: [0.0; 3].into(),
+                });
+            }
+        }
+        simulation.set_loads(&scratch.loads)?;
+        Ok(())
+    }
+
+    /// Averages of the grains to the continuum, its step, and what it does to the grains until the next exchange.
+    fn exchange(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
+        let dt = self.exchange_time();
+        self.sighting.look(simulation);
+        self.sum_up(-(-dt / self.spec.settings.stress_time).exp_m1());
+        for (owed, given) in self.owed.iter_mut().zip(&self.given.relaxation) {
+            for (owed, given) in owed.iter_mut().zip(given) {
+                *owed -= given;
+            }
+        }
+        self.watch_impulses();
+        for axis in 0..2 {
+            self.account.traction[axis] += self.given.traction[axis];
+            self.account.impedance[axis] += self.given.impedance[axis];
+        }
+        self.given.clear();
+        if !self.spec.settings.uncoupled {
+            self.copy_the_grains(dt)?;
+        }
+        self.step_continuum(dt, self.exchanges + 1)?;
+        self.agree();
+        self.watch();
+        Ok(())
+    }
+
+    /// Sums of the grains over the cells, stresses taken into their averages with this weight.
+    pub(super) fn sum_up(&mut self, weight: f64) {
+        let snapshot = &self.sighting.snapshot;
+        let (labels, inner) = (&self.labels, self.spec.zones()[1]);
+        self.sums
+            .cover(&self.cells, snapshot, inner, |g| label_of(labels, g));
+        self.sums.press(&self.cells, snapshot, weight);
+    }
+
+    /// Mass of a cell full of continuum (kg).
+    pub(super) fn full(&self) -> f64 {
+        self.spec.density() * self.cells.volume()
+    }
+
+    /// Puts together what acts on the continuum for a time (s).
+    fn press_on_continuum(&mut self, dt: f64) {
+        let units = self.collapse.units();
+        let (stress, force) = (
+            1.0 / units.stress(),
+            1.0 / (units.stress() * units.length * self.spec.slab),
+        );
+        let [handshake, inner] = self.spec.zones();
+        let full = self.full();
+        for cell in 0..self.cells.count() {
+            let cover = &self.sums.cover[cell];
+            let [xx, zz, xz] = self.sums.stress[cell];
+            let part = cover.mass / full;
+            let outside = &mut self.outside;
+            outside.pressure[cell] = (-0.5 * (xx + zz) * stress).max(0.0);
+            outside.stress[cell] = [0.5 * (xx - zz) * stress, xz * stress];
+            outside.cover[cell] = ((part - COVERS[0]) / (COVERS[1] - COVERS[0])).clamp(0.0, 1.0);
+            outside.share[cell] = match part > LEAST_COVER {
+                true => ((cover.label() - handshake) / (inner - handshake)).clamp(0.0, 1.0),
+                false => 0.0,
+            };
+            self.outside.force[cell] = self.owed[cell].map(|owed| owed / dt * force);
+        }
+    }
+
+    /// Steps of the continuum up to the end of an exchange.
+    fn step_continuum(&mut self, dt: f64, exchanges: u64) -> Result<(), OverlapError> {
+        let unit = self.collapse.units().time();
+        let until = exchanges as f64 * dt;
+        let coupled = !self.spec.settings.uncoupled;
+        if coupled {
+            self.press_on_continuum(dt);
+            self.collapse.flow_mut().set_outside(self.outside.clone())?;
+        }
+        let before = self.collapse.flow().state().velocity_time;
+        while self.collapse.time() < until * (1.0 - 1e-12) {
+            let step = self.collapse.step(until)?;
+            self.monitors.steps[0] += 1.0;
+            self.monitors.steps[1] += step.active_cells as f64;
+            self.monitors.residual = self.monitors.residual.max(step.residuals.momentum);
+        }
+        // Velocities have moved on by this, half a step ahead of the fractions.
+        let pushed = (self.collapse.flow().state().velocity_time - before) * unit;
+        let unit = self.impulse_unit();
+        let untaken = self.collapse.flow_mut().take_untaken();
+        for (sum, untaken) in self.account.untaken.iter_mut().zip(untaken) {
+            *sum += untaken * unit;
+        }
+        let mass = self.collapse.flow().volume() * unit / self.collapse.units().velocity;
+        self.account.continuum_weight[1] -= mass * self.spec.case.gravity * pushed;
+        if coupled {
+            for owed in &mut self.owed {
+                for (axis, owed) in owed.iter_mut().enumerate() {
+                    let answer = *owed * (pushed / dt);
+                    *owed -= answer;
+                    self.account.answer[axis] += answer;
+                }
+            }
+        }
+        self.view.look(&self.collapse, &self.cells);
+        Ok(())
+    }
+
+    /// A step of the continuum that is taken back but for its stress and pressure, for grains to meet at once.
+    pub(super) fn prime(&mut self) -> Result<(), OverlapError> {
+        self.view.look(&self.collapse, &self.cells);
+        let before = self.collapse.flow().state().clone();
+        let (account, monitors) = (self.account, self.monitors);
+        self.step_continuum(self.exchange_time(), 1)?;
+        self.collapse.set_state(before)?;
+        (self.account, self.monitors) = (account, monitors);
+        Ok(())
+    }
+
+    /// Slips between both sides, with the same hats at the grains' own places.
+    fn slips(&mut self) {
+        let [handshake, inner] = self.spec.zones();
+        for cover in &mut self.sums.cover {
+            (cover.buffer, cover.buffer_slip) = (0.0, [0.0; 2]);
+            (cover.inner, cover.inner_slip) = (0.0, [0.0; 2]);
+        }
+        for grain in &self.sighting.snapshot.grains {
+            let Some(label) = label_of(&self.labels, grain).filter(|label| *label < inner) else {
+                continue;
+            };
+            let hats = self.cells.hats(grain.position.x, grain.position.z);
+            let Some(u) = self.view.velocity_at(&hats) else {
+                continue;
+            };
+            let slip = [u[0] - grain.velocity.x, u[1] - grain.velocity.z];
+            for (cell, hat) in hats {
+                let cover = &mut self.sums.cover[cell];
+                let mass = grain.mass * hat;
+                let (sum, slips) = match label < handshake {
+                    true => (&mut cover.buffer, &mut cover.buffer_slip),
+                    false => (&mut cover.inner, &mut cover.inner_slip),
+                };
+                *sum += mass;
+                for (sum, slip) in slips.iter_mut().zip(slip) {
+                    *sum += mass * slip;
+                }
+            }
+        }
+    }
+
+    /// Takes the continuum's traction, forms the accelerations that bring mean velocities together, and finds the
+    /// edge and the handshake surface.
+    pub(super) fn agree(&mut self) {
+        self.slips();
+        let dt = self.exchange_time();
+        let rate = (dt / self.spec.settings.relaxation_time).min(1.0) / dt;
+        let full = self.full();
+        for cell in 0..self.cells.count() {
+            let cover = &self.sums.cover[cell];
+            let holds = self.view.is_full(cell) && cover.buffer > 0.1 * full;
+            self.held.accelerations[cell] = match holds {
+                true => cover.buffer_slip.map(|slip| rate * slip / cover.buffer),
+                false => [0.0; 2],
+            };
+        }
+        self.find_edge();
+        self.held.handshake = self.surface_of(self.spec.settings.buffer);
+    }
+
+    fn find_edge(&mut self) {
+        let d = self.spec.case.rheology.diameter;
+        let buffer = self.spec.settings.buffer;
+        let snapshot = &self.sighting.snapshot;
+        let near = snapshot
+            .grains
+            .iter()
+            .filter(|g| label_of(&self.labels, g).is_some_and(|label| label < buffer));
+        self.held.reach = near.fold(0.0, |most: f64, g| most.max(g.position.x)) + d;
+        let places = self.surface_of(0.5 * self.spec.settings.shell);
+        let slopes = slopes(&places, &self.cells);
+        let (h, slab) = (self.cells.spacing, self.spec.slab);
+        for (k, row) in self.held.rows.iter_mut().enumerate() {
+            let place = places[k] - 0.5 * self.spec.settings.shell;
+            *row = Row {
+                place,
+                ..Row::default()
+            };
+            let Some((fraction, [xx, zz, xz], velocity)) = self.view.across(&self.cells, place, k)
+            else {
+                continue;
+            };
+            let slope = slopes[k].clamp(-STEEPEST, STEEPEST);
+            let area = [-h * slab * fraction, h * slab * fraction * slope];
+            row.area = area;
+            row.velocity = velocity;
+            row.traction = [xx * area[0] + xz * area[1], xz * area[0] + zz * area[1]];
+        }
+    }
+
+    /// Where the surface of a label is, row by row (m): its place at the start, moved by the mean displacement of
+    /// the grains of nearby labels.
+    pub(super) fn surface_of(&self, label: f64) -> Vec<f64> {
+        let band = BAND * self.spec.case.rheology.diameter;
+        let mut sums = vec![[0.0; 2]; self.cells.counts[1]];
+        for grain in &self.sighting.snapshot.grains {
+            let Some(own) = label_of(&self.labels, grain) else {
+                continue;
+            };
+            if (own - label).abs() < band {
+                let moved = grain.position.x - self.spec.place - own;
+                for (row, hat) in self.cells.rows(grain.position.z) {
+                    sums[row][0] += grain.mass * hat;
+                    sums[row][1] += grain.mass * hat * moved;
+                }
+            }
+        }
+        let least = LEAST_ROW * self.spec.density() * band * self.cells.spacing * self.spec.slab;
+        let start = self.spec.place + label;
+        displacements(&sums, least)
+            .into_iter()
+            .map(|moved| start + moved)
+            .collect()
+    }
+}

@@ -1,0 +1,138 @@
+//! All of a joined column as numbers: what a run goes on from with the same bits.
+//!
+//! In front stands what every load changes, of a length that does not; behind it what an exchange changes, in rows
+//! with their lengths before them.
+
+use super::account::{self, Account, Monitors};
+use super::rows::{self, Row};
+use super::{MaterialEdge, MaterialEdgeSpec, OverlapError, continuum};
+use colluvium_dem::Simulation;
+
+/// Numbers in front but for the two rows of forces by cell, the account among them.
+const FRONT: usize = 11 + account::NUMBERS;
+
+impl MaterialEdge {
+    /// What every load changes.
+    fn front(&self) -> Vec<f64> {
+        let mut front = Vec::with_capacity(FRONT + 4 * self.cells.count());
+        front.extend([self.cells.count() as f64, self.made as f64, self.kick]);
+        for given in [&self.laid, &self.given] {
+            front.extend(given.traction);
+            front.extend(given.impedance);
+        }
+        front.extend(self.account.numbers());
+        front.extend(self.laid.relaxation.as_flattened());
+        front.extend(self.given.relaxation.as_flattened());
+        front
+    }
+
+    /// Writes what has changed since an exchange over what [`write`](Self::write) wrote after it.
+    pub fn write_over(&self, memory: &mut [f64]) {
+        let front = self.front();
+        memory[..front.len()].copy_from_slice(&front);
+    }
+
+    /// Appends all there is; to be called after every exchange.
+    pub fn write(&self, memory: &mut Vec<f64>) {
+        memory.extend(self.front());
+        let mut put = |row: &[f64]| {
+            memory.push(row.len() as f64);
+            memory.extend(row);
+        };
+        put(&[self.exchanges as f64, self.continuum_mass, self.held.reach]);
+        put(&self.monitors.numbers());
+        put(&self.labels);
+        put(self.sums.stress.as_flattened());
+        put(self.held.accelerations.as_flattened());
+        let rows: Vec<f64> = self.held.rows.iter().flat_map(Row::numbers).collect();
+        put(&rows);
+        put(&self.held.handshake);
+        put(self.owed.as_flattened());
+        continuum::write(self.collapse.flow().state(), &mut put);
+    }
+
+    /// Goes on from what was written of a column with the same specification; the simulation is the one that was
+    /// joined, resumed itself.
+    ///
+    /// # Errors
+    /// If the numbers do not belong to this specification.
+    pub fn read(
+        spec: MaterialEdgeSpec,
+        memory: &[f64],
+        simulation: &Simulation,
+    ) -> Result<Self, OverlapError> {
+        Self::read_back(spec, memory, simulation)?
+            .ok_or_else(|| OverlapError::Record("the joined column's memory misses a part".into()))
+    }
+
+    fn read_back(
+        spec: MaterialEdgeSpec,
+        memory: &[f64],
+        simulation: &Simulation,
+    ) -> Result<Option<Self>, OverlapError> {
+        let cells = memory.first().map_or(0, |cells| *cells as usize);
+        let front = FRONT + 4 * cells;
+        let Some((front, mut rest)) = memory.split_at_checked(front) else {
+            return Ok(None);
+        };
+        let mut take = || {
+            let (length, after) = rest.split_first()?;
+            let (row, after) = after.split_at_checked(*length as usize)?;
+            rest = after;
+            Some(row)
+        };
+        let Some(([exchanges, mass, reach], monitors)) = take()
+            .and_then(|row| <[f64; 3]>::try_from(row).ok())
+            .zip(take().and_then(|row| row.try_into().ok()))
+        else {
+            return Ok(None);
+        };
+        let Some(labels) = take() else {
+            return Ok(None);
+        };
+        let mut edge = Self::around(spec, mass, labels.to_vec(), simulation)?;
+        let Some([stress, accelerations, edge_rows, handshake, owed]) =
+            (|| Some([take()?, take()?, take()?, take()?, take()?]))()
+        else {
+            return Ok(None);
+        };
+        let Some(state) = continuum::read(&mut take) else {
+            return Ok(None);
+        };
+        let fits = stress.len() == 3 * cells
+            && accelerations.len() == 2 * cells
+            && owed.len() == 2 * cells
+            && edge_rows.len() == rows::NUMBERS * handshake.len()
+            && handshake.len() == edge.cells.counts[1]
+            && edge.cells.count() == cells;
+        let (scalars, forces) = front.split_at(FRONT);
+        let Ok(account) = scalars[11..].try_into() else {
+            return Ok(None);
+        };
+        if !fits {
+            return Ok(None);
+        }
+        edge.sums.stress = stress.as_chunks::<3>().0.to_vec();
+        edge.held.accelerations = accelerations.as_chunks::<2>().0.to_vec();
+        let numbers = edge_rows.as_chunks::<{ rows::NUMBERS }>().0;
+        edge.held.rows = numbers.iter().map(Row::of).collect();
+        edge.held.handshake = handshake.to_vec();
+        edge.held.reach = reach;
+        edge.owed = owed.as_chunks::<2>().0.to_vec();
+        edge.monitors = Monitors::of(monitors);
+        edge.exchanges = exchanges as u64;
+        edge.made = scalars[1] as u64;
+        edge.kick = scalars[2];
+        for (k, given) in [&mut edge.laid, &mut edge.given].into_iter().enumerate() {
+            let n = &scalars[3 + 4 * k..];
+            given.traction = [n[0], n[1]];
+            given.impedance = [n[2], n[3]];
+            let own = &forces[2 * cells * k..2 * cells * (k + 1)];
+            given.relaxation = own.as_chunks::<2>().0.to_vec();
+        }
+        edge.account = Account::of(account);
+        edge.collapse.set_state(state)?;
+        edge.view.look(&edge.collapse, &edge.cells);
+        Ok(Some(edge))
+    }
+}

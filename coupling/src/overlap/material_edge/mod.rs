@@ -1,0 +1,382 @@
+//! A column of grains and a plane continuum behind it, joined at an edge that moves with the material.
+//!
+//! At the start the edge is the vertical plane x = x_b. Grains lie beyond it; the continuum reaches from the wall at
+//! x = 0 to x_a, inside the grains. Each grain keeps the label ξ = x − x_b that it had at the start: labels say where
+//! in the overlap it is, however the material has deformed, and nothing ever crosses the edge. From the edge into the
+//! grains: *shell* ξ < b, *buffer* ξ < ξ_m, *inner overlap* ξ_m < ξ < ξ_a; totals count grains of ξ > ξ_m and the
+//! continuum behind them. What is exchanged is what a flat edge exchanges (see [`super`]), cell by cell:
+//!
+//! - *on the continuum*: its surface inside the grains bears their mean pressure, and from ξ_m to ξ_a its deviatoric
+//!   stress is w σ_grains + (1 − w) σ_continuum, w = (ξ̄ − ξ_m)/(ξ_a − ξ_m) from the mean label ξ̄ of a cell's grains
+//!   ([`Outside`]); beyond ξ_m it is a copy of the grains, made anew at every exchange (`copy.rs`);
+//! - *on the grains*: the shell bears the continuum's traction row by row, with an impedance in its normal part
+//!   (`rows.rs`);
+//! - *on both, equal and opposite*: mean velocities of the buffer relax to each other, along x and z.
+//!
+//! The continuum is what is missing of the column's mass, at the solid fraction of its grains. Spins are not
+//! coupled.
+
+mod account;
+mod cells;
+mod continuum;
+mod copy;
+mod exchange;
+mod memory;
+mod rows;
+mod totals;
+mod watch;
+
+pub use account::{Account, Monitors};
+pub use cells::Cells;
+
+use super::OverlapError;
+use super::settings::Resolved;
+use super::sighting::Sighting;
+use cells::Sums;
+use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
+use colluvium_continuum::free_surface::{Outside, SurfaceOptions};
+use colluvium_dem::{GrainSample, Simulation};
+use continuum::View;
+use rows::Row;
+
+/// Stands for the label of what has none.
+const NO_LABEL: f64 = f64::MAX;
+
+/// What a column is joined from (SI).
+#[derive(Clone, Copy, Debug)]
+pub struct MaterialEdgeSpec {
+    /// The whole column as a continuum, at the solid fraction of its grains.
+    pub case: CollapseCase,
+    /// Settings of the continuum's solver.
+    pub options: SurfaceOptions,
+    /// Where the edge is at the start, x_b (m).
+    pub place: f64,
+    /// Width of the slab across (m).
+    pub slab: f64,
+    /// Widths, times and the impedance.
+    pub settings: Resolved,
+}
+
+impl MaterialEdgeSpec {
+    /// Labels at which the buffer and the inner overlap end, ξ_m and ξ_a (m).
+    pub fn zones(&self) -> [f64; 2] {
+        let s = &self.settings;
+        [s.buffer, s.buffer + s.inner]
+    }
+
+    /// Density of the continuum (kg/m³).
+    pub fn density(&self) -> f64 {
+        self.case.rheology.bulk_density()
+    }
+
+    /// Spacing of the grid (m).
+    pub fn spacing(&self) -> f64 {
+        self.case.length_scaled * self.case.height / self.case.cells as f64
+    }
+
+    /// The column of the continuum that has a mass (kg), from the wall to x_a.
+    fn column(&self, mass: f64) -> CollapseCase {
+        let width = self.place + self.zones()[1];
+        let height = mass / (self.density() * self.slab * width);
+        CollapseCase {
+            aspect: height / width,
+            height,
+            length_scaled: self.spacing() * self.case.cells as f64 / height,
+            overhang_degrees: 0.0,
+            ..self.case
+        }
+    }
+}
+
+/// What acts on the grains until the next exchange.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Held {
+    /// Accelerations of mean velocities of the buffer, cell by cell (m/s²).
+    accelerations: Vec<[f64; 2]>,
+    rows: Vec<Row>,
+    /// No grain of the buffer lies farther than this (m).
+    reach: f64,
+    /// Where the handshake surface is, row by row (m).
+    handshake: Vec<f64>,
+}
+
+/// Sums of forces that are laid (N), or of their impulses since the last exchange (N s).
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Given {
+    relaxation: Vec<[f64; 2]>,
+    traction: [f64; 2],
+    impedance: [f64; 2],
+}
+
+impl Given {
+    fn nothing(cells: usize) -> Self {
+        Self {
+            relaxation: vec![[0.0; 2]; cells],
+            ..Self::default()
+        }
+    }
+
+    fn clear(&mut self) {
+        self.relaxation.fill([0.0; 2]);
+        (self.traction, self.impedance) = ([0.0; 2], [0.0; 2]);
+    }
+}
+
+/// Grains and continuum joined at an edge that moves with them. The grains are the caller's: every call needs the
+/// same simulation.
+pub struct MaterialEdge {
+    spec: MaterialEdgeSpec,
+    cells: Cells,
+    collapse: Collapse,
+    /// Mass of the continuum, copy included (kg).
+    continuum_mass: f64,
+    /// By grain number; [`NO_LABEL`] for what has none.
+    labels: Vec<f64>,
+    sums: Sums,
+    view: View,
+    held: Held,
+    laid: Given,
+    given: Given,
+    /// By how much time the first step under what is laid changed velocities (s).
+    kick: f64,
+    /// Impulse that the continuum has still to take from the relaxation (N s).
+    owed: Vec<[f64; 2]>,
+    account: Account,
+    monitors: Monitors,
+    /// Steps for which loads are held, how often until an exchange, and how often since the last one.
+    steps_of_loads: u64,
+    loads_of_exchange: u64,
+    made: u64,
+    exchanges: u64,
+    timestep: f64,
+    sighting: Sighting,
+    scratch: exchange::Scratch,
+    outside: Outside,
+}
+
+impl MaterialEdge {
+    /// Steps of the grains for which loads are held, for a time step (s).
+    pub fn steps_of_loads(settings: &Resolved, timestep: f64) -> u64 {
+        (settings.load_time / timestep).round().max(1.0) as u64
+    }
+
+    /// Cuts a column of grains at the edge: what lies behind it becomes continuum.
+    ///
+    /// # Errors
+    /// Settings out of range, no grains on a side, or a continuum that cannot stand.
+    pub fn cut(spec: MaterialEdgeSpec, simulation: &mut Simulation) -> Result<Self, OverlapError> {
+        let mut sighting = Sighting::default();
+        sighting.look(simulation);
+        let [_, inner] = spec.zones();
+        let free = || sighting.snapshot.grains.iter().filter(|g| !g.fixed);
+        let last = free().map(|g| g.id).max().unwrap_or(0) as usize;
+        let mut labels = vec![NO_LABEL; last + 1];
+        let (mut before, mut total) = (0.0, 0.0);
+        for grain in free() {
+            let label = grain.position.x - spec.place;
+            total += grain.mass;
+            if label < inner {
+                before += grain.mass;
+            }
+            labels[grain.id as usize] = label;
+        }
+        let mut edge = Self::around(spec, before, labels, simulation)?;
+        edge.sighting = sighting;
+        edge.account.mass = total;
+        // Stresses as they are while all grains are still there.
+        edge.sum_up(1.0);
+        let floor = spec.place - spec.settings.inner;
+        let place = spec.place;
+        simulation.remove(|g| g.position.x < if g.fixed { floor } else { place });
+        edge.sighting.look(simulation);
+        edge.account.grains_before = edge.grain_momentum(simulation);
+        edge.account.continuum_before = edge.continuum_momentum();
+        edge.prime()?;
+        edge.agree();
+        // What it was primed with is not its state.
+        edge.view.look(&edge.collapse, &edge.cells);
+        edge.lay(simulation)?;
+        Ok(edge)
+    }
+
+    fn around(
+        spec: MaterialEdgeSpec,
+        mass: f64,
+        labels: Vec<f64>,
+        simulation: &Simulation,
+    ) -> Result<Self, OverlapError> {
+        let collapse = Collapse::new(&spec.column(mass), &spec.options)?;
+        let axes = collapse.flow().grid().axes();
+        let cells = Cells {
+            counts: [axes[0].cells(), axes[1].cells()],
+            spacing: spec.spacing(),
+            slab: spec.slab,
+        };
+        let steps_of_loads = Self::steps_of_loads(&spec.settings, simulation.timestep());
+        let load_time = steps_of_loads as f64 * simulation.timestep();
+        let loads = (spec.settings.exchange_time / load_time).round().max(1.0);
+        Ok(Self {
+            cells,
+            collapse,
+            continuum_mass: mass,
+            labels,
+            sums: Sums::nothing(&cells),
+            view: View::default(),
+            held: Held {
+                accelerations: vec![[0.0; 2]; cells.count()],
+                rows: vec![Row::default(); cells.counts[1]],
+                reach: 0.0,
+                handshake: vec![spec.place + spec.settings.buffer; cells.counts[1]],
+            },
+            laid: Given::nothing(cells.count()),
+            given: Given::nothing(cells.count()),
+            kick: 0.0,
+            owed: vec![[0.0; 2]; cells.count()],
+            account: Account::default(),
+            monitors: Monitors::default(),
+            steps_of_loads,
+            loads_of_exchange: loads as u64,
+            made: 0,
+            exchanges: 0,
+            timestep: simulation.timestep(),
+            sighting: Sighting::default(),
+            scratch: exchange::Scratch::default(),
+            outside: Outside::nothing(cells.count()),
+            spec,
+        })
+    }
+
+    /// Label of a free grain (m); none of what has none.
+    pub fn label(&self, grain: &GrainSample) -> Option<f64> {
+        label_of(&self.labels, grain)
+    }
+
+    /// Whether totals count a grain of this number.
+    pub fn counts(&self, id: u32) -> bool {
+        self.labels
+            .get(id as usize)
+            .is_some_and(|label| *label > self.spec.settings.buffer && *label < NO_LABEL)
+    }
+
+    /// The continuum.
+    pub fn collapse(&self) -> &Collapse {
+        &self.collapse
+    }
+
+    /// The grid of the continuum.
+    pub fn cells(&self) -> &Cells {
+        &self.cells
+    }
+
+    /// What it was made from.
+    pub fn spec(&self) -> &MaterialEdgeSpec {
+        &self.spec
+    }
+
+    /// Accounts since the start, with what the grains have been given since the last exchange.
+    pub fn account(&self, simulation: &Simulation) -> Account {
+        let mut account = self.account;
+        let gravity = simulation.gravity();
+        let weight = [gravity.x, gravity.z].map(|g| g * simulation.free_mass());
+        let time = self.acting(simulation);
+        for axis in 0..2 {
+            let relaxation: f64 = self.laid.relaxation.iter().map(|f| f[axis]).sum();
+            account.traction[axis] += self.given.traction[axis] + self.laid.traction[axis] * time;
+            account.impedance[axis] +=
+                self.given.impedance[axis] + self.laid.impedance[axis] * time;
+            account.relaxation[axis] += relaxation * time;
+            account.weight[axis] += weight[axis] * time;
+        }
+        account
+    }
+
+    /// For how long what is laid has acted and is not booked yet (s).
+    fn acting(&self, simulation: &Simulation) -> f64 {
+        match simulation.steps_done() % self.steps_of_loads {
+            0 => 0.0,
+            steps => self.kick + (steps - 1) as f64 * self.timestep,
+        }
+    }
+
+    /// Momentum that the continuum has still to take from the relaxation (N s).
+    pub fn owed(&self, simulation: &Simulation) -> [f64; 2] {
+        let time = self.acting(simulation);
+        let forces = self.laid.relaxation.iter().zip(&self.given.relaxation);
+        let all = self.owed.iter().zip(forces);
+        [0, 1].map(|axis| {
+            let of = all.clone();
+            of.map(|(owed, (laid, given))| owed[axis] - given[axis] - laid[axis] * time)
+                .sum()
+        })
+    }
+
+    /// What the monitors have seen.
+    pub fn monitors(&self) -> &Monitors {
+        &self.monitors
+    }
+
+    /// Time between two exchanges (s).
+    pub fn exchange_time(&self) -> f64 {
+        (self.loads_of_exchange * self.steps_of_loads) as f64 * self.timestep
+    }
+
+    /// Exchanges made.
+    pub fn exchanges(&self) -> u64 {
+        self.exchanges
+    }
+
+    /// Whether an exchange has just been made.
+    pub fn at_exchange(&self) -> bool {
+        self.made == 0
+    }
+
+    /// Momentum of the grains along x and z, with what walls have taken (N s).
+    pub fn grain_momentum(&self, simulation: &mut Simulation) -> [f64; 2] {
+        let momentum = simulation.leapfrog_momentum() + simulation.wall_impulse();
+        [momentum.x, momentum.z]
+    }
+
+    /// Momentum of the continuum along x and z, copy included (N s).
+    pub fn continuum_momentum(&self) -> [f64; 2] {
+        let unit = self.impulse_unit();
+        self.collapse.flow().momentum().map(|p| p * unit)
+    }
+
+    /// Kinetic energy of the continuum behind the handshake surface, of the mean velocities of its cells (J).
+    pub fn continuum_kinetic(&self) -> f64 {
+        let columns = self.cells.counts[0];
+        let cells = self.view.velocity.iter().zip(&self.view.fraction);
+        let counted = cells.enumerate().filter(|(cell, _)| {
+            let place = ((cell % columns) as f64 + 0.5) * self.cells.spacing;
+            place < self.held.handshake[cell / columns]
+        });
+        let twice: f64 = counted.map(|(_, ([u, w], f))| f * (u * u + w * w)).sum();
+        0.5 * self.spec.density() * self.cells.volume() * twice
+    }
+
+    /// Mass of the continuum, copy included (kg).
+    pub fn continuum_mass(&self) -> f64 {
+        self.continuum_mass
+    }
+
+    /// Height of the continuum, copy included, over each column of cells (m).
+    pub fn continuum_heights(&self) -> (Vec<f64>, Vec<f64>) {
+        self.collapse.profile()
+    }
+
+    /// ρ U L² W (N s).
+    fn impulse_unit(&self) -> f64 {
+        let u = self.collapse.units();
+        u.density * u.velocity * u.length * u.length * self.spec.slab
+    }
+
+    /// Where the handshake surface is, row by row (m): where grains of nearby labels have moved to.
+    pub fn handshake(&self) -> &[f64] {
+        &self.held.handshake
+    }
+}
+
+fn label_of(labels: &[f64], grain: &GrainSample) -> Option<f64> {
+    let label = labels.get(grain.id as usize).copied();
+    label.filter(|label| *label < NO_LABEL && !grain.fixed)
+}

@@ -1,0 +1,76 @@
+//! What the monitors look at after every exchange.
+
+use super::cells::over;
+use super::{MaterialEdge, label_of};
+
+/// How far beyond the edge a grain has escaped, in diameters.
+const ESCAPED: f64 = 1.0;
+
+impl MaterialEdge {
+    /// Sums |impulses| of what the grains were given.
+    pub(super) fn watch_impulses(&mut self) {
+        let size = |[x, z]: [f64; 2]| f64::hypot(x, z);
+        let relaxation: f64 = self.given.relaxation.iter().copied().map(size).sum();
+        let traction: f64 = self.held.rows.iter().map(|row| size(row.traction)).sum();
+        self.monitors.impulse[0] += relaxation;
+        self.monitors.impulse[1] += traction * self.exchange_time();
+    }
+
+    /// Looks at both sides of the handshake surface.
+    pub(super) fn watch(&mut self) {
+        let d = self.spec.case.rheology.diameter;
+        let columns = self.cells.counts[0];
+        let (mut slips, mut weights) = (0.0, 0.0);
+        let mut force = [0.0; 2];
+        for (k, &place) in self.held.handshake.iter().enumerate() {
+            let Some((fraction, [xx, _, _], _)) = self.view.across(&self.cells, place, k) else {
+                continue;
+            };
+            let at = place / self.cells.spacing - 0.5;
+            let low = at.floor();
+            let hats = [(0, 1.0 - (at - low)), (1, at - low)];
+            let mut grains = 0.0;
+            for (n, hat) in hats {
+                let i = (low as i64 + n).clamp(0, columns as i64 - 1) as usize;
+                let cell = i + columns * k;
+                grains += hat * self.sums.stress[cell][0];
+                let cover = &self.sums.cover[cell];
+                let mass = cover.buffer + cover.inner;
+                if mass > 0.0 {
+                    let slip = [0, 1].map(|a| (cover.buffer_slip[a] + cover.inner_slip[a]) / mass);
+                    weights += mass * hat;
+                    slips += mass * hat * (slip[0] * slip[0] + slip[1] * slip[1]);
+                }
+            }
+            force[0] -= fraction * grains;
+            force[1] -= fraction * xx;
+        }
+        let area = self.cells.spacing * self.spec.slab;
+        let slip = over(slips, weights).sqrt();
+        let full = self.full();
+        let (mut packed, mut cells) = (0.0, 0.0);
+        for (cell, cover) in self.sums.cover.iter().enumerate() {
+            let own = cover.buffer + cover.inner;
+            // Cells all of whose grains belong to the overlap, with continuum on all of them.
+            if own > 0.95 * cover.mass && self.view.fraction[cell] > 0.99 && own > 0.5 * full {
+                packed += own / full;
+                cells += 1.0;
+            }
+        }
+        let places: Vec<f64> = self.held.rows.iter().map(|row| row.place).collect();
+        let escaped = self.sighting.snapshot.grains.iter().filter(|g| {
+            let row = self.cells.rows(g.position.z)[0].0;
+            label_of(&self.labels, g).is_some() && g.position.x < places[row] - ESCAPED * d
+        });
+        let escaped = escaped.count() as f64;
+        let m = &mut self.monitors;
+        m.exchanges += 1.0;
+        m.slip += slip;
+        m.largest_slip = m.largest_slip.max(slip);
+        for (sum, force) in m.force.iter_mut().zip(force) {
+            *sum += force * area;
+        }
+        m.packing += over(packed, cells);
+        m.escaped = m.escaped.max(escaped);
+    }
+}

@@ -1,0 +1,228 @@
+//! A column that is continuum behind an edge that moves with the material, and grains in front of it.
+
+use crate::world::{DENSITY, STEP, STIFFNESS, law, steps};
+use colluvium_continuum::column_collapse::CollapseCase;
+use colluvium_continuum::free_surface::SurfaceOptions;
+use colluvium_continuum::rheology::MuI;
+use colluvium_coupling::overlap::material_edge::{MaterialEdge, MaterialEdgeSpec};
+use colluvium_coupling::overlap::{OverlapSettings, Scales};
+use colluvium_dem::preparation::*;
+use colluvium_dem::*;
+use nalgebra::Vector3;
+use std::ops::ControlFlow;
+use std::sync::OnceLock;
+
+const LENGTH: f64 = 20.0;
+const HEIGHT: f64 = 8.0;
+const WIDTH: f64 = 5.0;
+const EDGE: f64 = 6.0;
+
+fn setup(grains: Vec<Grain>, gate: bool) -> Setup {
+    let mut walls = vec![
+        Wall::plane(Vector3::zeros(), Vector3::x()),
+        Wall::plane(Vector3::zeros(), Vector3::z()),
+    ];
+    if gate {
+        walls.push(Wall::plane(LENGTH * Vector3::x(), -Vector3::x()));
+    }
+    Setup {
+        domain: domain(),
+        gravity: -Vector3::z(),
+        law: law().into(),
+        grains,
+        walls,
+        bodies: Vec::new(),
+        timestep: STEP,
+        threads: Threads::Serial,
+    }
+}
+
+fn domain() -> Domain {
+    Domain {
+        lower: Vector3::new(0.0, 0.0, -1.0),
+        upper: Vector3::new(3.0 * LENGTH, WIDTH, 4.0 * HEIGHT),
+        periodic: [false, true, false],
+    }
+}
+
+/// Grains at rest between the wall and a gate, cut level.
+fn settled() -> &'static [Grain] {
+    static COLUMN: OnceLock<Vec<Grain>> = OnceLock::new();
+    COLUMN.get_or_init(|| {
+        let radius = RadiusLaw::Uniform {
+            low: 0.45,
+            high: 0.55,
+        };
+        let cloud = Insertion {
+            region: Region::Block {
+                lower: Vector3::zeros(),
+                upper: Vector3::new(LENGTH, WIDTH, 2.6 * HEIGHT),
+            },
+            domain: domain(),
+            ingredients: vec![Ingredient::alone(radius, DENSITY)],
+            amount: Amount::Grains(960),
+            gap: 0.0,
+            velocity: Vector3::zeros(),
+            tries: TRIES,
+            seed: 5,
+        };
+        let (grains, _) = insert_loose(&cloud, &[]).unwrap();
+        let mut simulation = Simulation::new(setup(grains, true)).unwrap();
+        let rest = Relaxation {
+            rest: Rest {
+                kinetic: 1e-7,
+                unbalanced: 0.01,
+            },
+            ..Relaxation::under(1.0)
+        };
+        let mut go = |_: &RestMeasures| ControlFlow::Continue(());
+        relax(&mut simulation, &rest, &mut go).unwrap();
+        simulation.remove(|g| g.position.z > HEIGHT - 0.3);
+        relax(&mut simulation, &rest, &mut go).unwrap();
+        simulation.grain_list()
+    })
+}
+
+fn spec(solid_fraction: f64, uncoupled: bool) -> MaterialEdgeSpec {
+    let scales = Scales {
+        diameter: 1.0,
+        time: 1.0,
+        density: solid_fraction * DENSITY,
+        stiffness: STIFFNESS,
+    };
+    let settings = OverlapSettings {
+        uncoupled,
+        ..OverlapSettings::default()
+    };
+    let cells = 48;
+    MaterialEdgeSpec {
+        case: CollapseCase {
+            aspect: HEIGHT / LENGTH,
+            height: HEIGHT,
+            gravity: 1.0,
+            rheology: MuI::new(0.36, 0.70, 0.3, 1.0, solid_fraction, DENSITY),
+            cells,
+            length_scaled: cells as f64 / HEIGHT,
+            overhang_degrees: 0.0,
+        },
+        options: SurfaceOptions::default(),
+        place: EDGE,
+        slab: WIDTH,
+        settings: settings.resolve(&scales, false).unwrap(),
+    }
+}
+
+struct Joined {
+    simulation: Simulation,
+    edge: MaterialEdge,
+}
+
+impl Joined {
+    fn new(gate: bool, uncoupled: bool) -> Self {
+        let mut simulation = Simulation::new(setup(settled().to_vec(), gate)).unwrap();
+        let middle = Region::Block {
+            lower: Vector3::new(2.0, 0.0, 1.0),
+            upper: Vector3::new(LENGTH - 2.0, WIDTH, HEIGHT - 1.5),
+        };
+        let phi = solid_fraction(settled(), &domain(), &middle);
+        let edge = MaterialEdge::cut(spec(phi, uncoupled), &mut simulation).unwrap();
+        Self { simulation, edge }
+    }
+
+    fn advance(&mut self, time: f64, keep: f64) {
+        let each = MaterialEdge::steps_of_loads(&self.edge.spec().settings, STEP);
+        for _ in 0..steps(time) / each {
+            self.simulation.advance(each).unwrap();
+            self.edge.go_on(&mut self.simulation).unwrap();
+            if keep < 1.0 && self.edge.at_exchange() {
+                self.simulation.damp(keep);
+            }
+        }
+    }
+
+    /// Rms velocities of the grains and of the continuum.
+    fn speeds(&mut self) -> [f64; 2] {
+        let grains = self.simulation.held(|_| true);
+        let [twice, mass] = grains.fold([0.0; 2], |[e, m], g| {
+            [e + g.mass * g.velocity.norm_squared(), m + g.mass]
+        });
+        let continuum = 2.0 * self.edge.continuum_kinetic() / self.edge.continuum_mass();
+        [twice / mass, continuum].map(f64::sqrt)
+    }
+
+    /// Mean of the continuum's pressure over the weight above, behind the edge and in the overlap, in cells at least
+    /// a quarter of the height below the surface.
+    fn pressures(&self) -> [f64; 2] {
+        let density = self.edge.spec().density();
+        let top = self.edge.continuum_heights().1[2];
+        let [_, inner] = self.edge.spec().zones();
+        let mut sums = [[0.0; 2]; 2];
+        for f in self.edge.collapse().fields() {
+            let [x, z] = [0, 1].map(|a| 0.5 * (f.lower[a] + f.upper[a]));
+            if z > 0.75 * top || x > EDGE + inner || f.pressure <= 0.0 {
+                continue;
+            }
+            let zone = usize::from(x > EDGE);
+            sums[zone][0] += f.pressure;
+            sums[zone][1] += density * (top - z);
+        }
+        sums.map(|[p, weight]| p / weight)
+    }
+}
+
+/// What a column behind its gate does when it is left alone.
+struct Calm {
+    /// Rms velocities of the grains and of the continuum, over √(g d).
+    speeds: [f64; 2],
+    /// The continuum's pressure over the weight above, behind the edge and in the overlap.
+    pressures: [f64; 2],
+    /// Most that the handshake surface has moved in a row (d).
+    moved: f64,
+    escaped: f64,
+}
+
+fn rest(uncoupled: bool, time: f64) -> Calm {
+    let mut joined = Joined::new(true, uncoupled);
+    joined.advance(15.0, 0.9);
+    let before = joined.edge.handshake().to_vec();
+    joined.advance(time, 1.0);
+    let monitors = joined.edge.monitors();
+    let escaped = monitors.escaped;
+    let pairs = joined.edge.handshake().iter().zip(&before);
+    let moved = pairs.map(|(x, before)| (x - before).abs());
+    let moved = moved.fold(0.0, f64::max);
+    let fastest = joined.simulation.held(|_| true);
+    let fastest = fastest.max_by(|a, b| a.velocity.norm().total_cmp(&b.velocity.norm()));
+    println!(
+        "force ratio {:.3}, packing {:.3}, slip {:.1e}, fastest {:?}",
+        monitors.force_ratio(),
+        monitors.packing_ratio(),
+        monitors.mean_slip(),
+        fastest.map(|g| (g.position, g.velocity))
+    );
+    let rest = Calm {
+        speeds: joined.speeds(),
+        pressures: joined.pressures(),
+        moved,
+        escaped,
+    };
+    let ([grains, continuum], pressures) = (rest.speeds, rest.pressures);
+    println!(
+        "uncoupled {uncoupled}: grains {grains:.1e}, continuum {continuum:.1e}, pressure over weight {pressures:.3?}, moved {moved:.3}, \
+         escaped {escaped}"
+    );
+    rest
+}
+
+/// A column behind a gate: both sides rest, and the pressure of the continuum is the weight above. What moves still is a
+/// single grain of the shell that hangs by one or two contacts and rattles under its share of the traction. With nothing
+/// exchanged grains and continuum fall into each other.
+#[test]
+fn a_column_behind_a_gate_stays_at_rest_and_bears_its_weight() {
+    let joined = rest(false, 5.0);
+    assert!(joined.speeds[0] < 0.03 && joined.speeds[1] < 1e-4);
+    assert!(joined.pressures.iter().all(|p| (p - 1.0).abs() < 0.05));
+    assert!(joined.moved < 0.01 && joined.escaped == 0.0);
+    let control = rest(true, 5.0);
+    assert!(control.escaped > 0.0 && control.pressures[1] < 0.8);
+}

@@ -1,0 +1,395 @@
+//! The collapse of a column that is grains in front and a continuum behind.
+//!
+//! The whole column is settled as grains, the same as with `model = "dem"`; when the gate goes, what lies behind the
+//! edge becomes continuum (`coupling::overlap::material_edge`). Preparation, walls and step are those of the column
+//! of grains. Heights are those of the grains beyond the handshake surface and of the continuum behind it, smeared
+//! in the same way.
+
+mod findings;
+
+use super::column_of_grains::{BEGUN, FRONTS, PROFILE_EVERY, STILL, STILL_LOOKS};
+use super::heap::{HeapCourse, edge};
+use super::world::{Course, Expected, Ran, Recipe, Workshop, World};
+use super::{Findings, Under};
+use crate::failure::Failure;
+use crate::rheology_file::RheologyFile;
+use crate::scene::world::{Materials, OutputKeys, StepKeys};
+use crate::scene::{CollapseScene, LawKeys, Scene};
+use crate::summary::Summary;
+use crate::table::Table;
+use colluvium_continuum::column_collapse::CollapseCase;
+use colluvium_continuum::rheology::MuI;
+use colluvium_coupling::overlap::OverlapError;
+use colluvium_coupling::overlap::material_edge::{MaterialEdge, MaterialEdgeSpec};
+use colluvium_dem::preparation::{Packing, solid_fraction};
+use colluvium_dem::{Simulation, Snapshot};
+use std::path::Path;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// A column, and what is alive of it while it runs.
+#[derive(Debug)]
+pub struct JoinedColumn<'a> {
+    scene: &'a CollapseScene,
+    origin: String,
+    live: Mutex<Option<Live>>,
+}
+
+/// What the recipe's memory holds, in a form that goes on.
+struct Live {
+    edge: MaterialEdge,
+    course: HeapCourse,
+}
+
+impl std::fmt::Debug for Live {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(
+            f,
+            "a joined column after {} exchanges",
+            self.edge.exchanges()
+        )
+    }
+}
+
+/// Numbers in front of the edge's in the memory: solid fraction, and how many the edge has.
+const HEAD: usize = 2;
+
+/// Checks the scene before anything is written.
+pub(super) fn check(scene: &Scene, body: &CollapseScene) -> Result<(), Failure> {
+    let column = JoinedColumn::new(body, &scene.origin);
+    let named = |why: String| Failure::Input(format!("{}: {why}", scene.origin));
+    let spec = column.spec(crate::scene::DENSE)?;
+    spec.case.validate().map_err(|why| named(why.to_string()))?;
+    spec.options
+        .validate()
+        .map_err(|why| named(why.to_string()))?;
+    super::world::course::check(scene, &column)
+}
+
+/// Runs it.
+pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, Failure> {
+    let column = JoinedColumn::new(scene, &under.scene.origin);
+    super::world::course::run(&column, under)
+}
+
+/// What an error of the coupling means for the process.
+fn failure(error: OverlapError) -> Failure {
+    match error {
+        OverlapError::OutOfRange { .. } | OverlapError::Record(_) => {
+            Failure::Input(error.to_string())
+        }
+        error => Failure::Run(error.to_string()),
+    }
+}
+
+impl<'a> JoinedColumn<'a> {
+    /// Before anything runs.
+    pub fn new(scene: &'a CollapseScene, origin: &str) -> Self {
+        Self {
+            scene,
+            origin: origin.to_owned(),
+            live: Mutex::new(None),
+        }
+    }
+
+    /// The law of the continuum, at a solid fraction: that which the grains were calibrated to, or the scene's.
+    fn law(&self, solid_fraction: f64) -> Result<MuI, Failure> {
+        let scene = self.scene;
+        let own = match scene.grains.calibrated.word() {
+            Some(word) => {
+                let file = RheologyFile::read(Path::new(word))?;
+                [file.mu_s, file.mu_2, file.i_0]
+            }
+            None => {
+                let law = scene.rheology.mu_i();
+                [law.mu_s, law.mu_2, law.i_0]
+            }
+        };
+        let [mu_s, mu_2, i_0] = own;
+        Ok(MuI {
+            mu_s,
+            mu_2,
+            i_0,
+            diameter: scene.grains.diameter,
+            solid_fraction,
+            grain_density: scene.grains.density,
+            cohesion: 0.0,
+        })
+    }
+
+    /// What the column is joined from, at a solid fraction.
+    fn spec(&self, solid_fraction: f64) -> Result<MaterialEdgeSpec, Failure> {
+        let scene = self.scene;
+        Ok(MaterialEdgeSpec {
+            case: CollapseCase {
+                aspect: scene.aspect,
+                height: scene.height,
+                gravity: scene.gravity,
+                rheology: self.law(solid_fraction)?,
+                cells: scene.cells(),
+                length_scaled: scene.grid.length_scaled,
+                overhang_degrees: 0.0,
+            },
+            options: super::collapse::options(scene),
+            place: scene.edge(),
+            slab: scene.slab(),
+            settings: scene.overlap_settings(&self.origin)?,
+        })
+    }
+
+    fn live(&self) -> MutexGuard<'_, Option<Live>> {
+        self.live.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    /// From a recipe's memory.
+    fn recalled(&self, simulation: &Simulation, memory: &[f64]) -> Result<Live, Failure> {
+        let damaged = || Failure::Input("--resume: the checkpoint is damaged: recipe/state".into());
+        let (head, rest) = memory.split_at_checked(HEAD).ok_or_else(damaged)?;
+        let (own, course) = rest
+            .split_at_checked(head[1] as usize)
+            .ok_or_else(damaged)?;
+        let edge = MaterialEdge::read(self.spec(head[0])?, own, simulation).map_err(failure)?;
+        let course =
+            HeapCourse::read(course, self.scene.heap_axis().columns).ok_or_else(damaged)?;
+        Ok(Live { edge, course })
+    }
+
+    /// Cuts the column when the gate goes.
+    fn begin(&self, simulation: &mut Simulation) -> Result<Live, Failure> {
+        let solid = solid_fraction(
+            &simulation.grain_list(),
+            simulation.domain(),
+            &self.scene.middle(),
+        );
+        let edge = MaterialEdge::cut(self.spec(solid)?, simulation).map_err(failure)?;
+        let mut live = Live {
+            edge,
+            course: HeapCourse {
+                solid_fraction: solid,
+                ..HeapCourse::default()
+            },
+        };
+        self.see(simulation, &mut live, true);
+        Ok(live)
+    }
+
+    /// Exchanges between two looks at the front.
+    fn exchanges_of_a_front(&self, edge: &MaterialEdge) -> u64 {
+        (self.scene.duration() / FRONTS / edge.exchange_time())
+            .round()
+            .max(1.0) as u64
+    }
+
+    /// Heights of grains beyond the handshake surface and of the continuum behind it; `part` of the slab and the
+    /// grains that it takes.
+    fn heights(
+        &self,
+        simulation: &Simulation,
+        live: &Live,
+        part: f64,
+        f: impl Fn(f64) -> bool,
+    ) -> Vec<f64> {
+        let solid = |radius: f64| 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
+        let mut grains: Vec<(u32, [f64; 2])> = simulation
+            .held(|x| f(x.y))
+            .filter(|g| live.edge.counts(g.id))
+            .map(|g| (g.id, [g.position.x, solid(g.radius)]))
+            .collect();
+        grains.sort_unstable_by_key(|(id, _)| *id);
+        let parcels = live.edge.parcels();
+        let behind = parcels.into_iter().map(|[x, volume]| [x, part * volume]);
+        let rows = grains.into_iter().map(|(_, row)| row).chain(behind);
+        let base = live.course.solid_fraction * self.scene.slab() * part;
+        self.scene.heap_axis().heights(rows, base)
+    }
+
+    fn see(&self, simulation: &Simulation, live: &mut Live, profile: bool) {
+        let heights = self.heights(simulation, live, 1.0, |_| true);
+        let places = self.scene.heap_axis().positions();
+        let front = edge(&places, &heights, self.scene.threshold());
+        let highest = heights.iter().copied().fold(0.0, f64::max);
+        let time = simulation.time();
+        live.course.fronts.push([time, front, highest]);
+        if profile {
+            live.course.profiles.push((time, heights));
+        }
+    }
+
+    fn remember(live: &Live, state: &mut Vec<f64>) {
+        let mut edge = Vec::with_capacity(state.len());
+        live.edge.write(&mut edge);
+        let mut course = Vec::new();
+        live.course.write(&mut course);
+        state.clear();
+        state.extend([live.course.solid_fraction, edge.len() as f64]);
+        state.append(&mut edge);
+        state.append(&mut course);
+    }
+
+    /// Whether both sides have come to rest.
+    fn rests(&self, simulation: &mut Simulation, live: &mut Live) -> bool {
+        let unit = self.scene.gravity * self.scene.grains.diameter;
+        let mass = simulation.free_mass();
+        let still = simulation.time() > BEGUN * self.scene.time_unit()
+            && simulation.energy().kinetic() < STILL * mass * unit
+            && live.edge.continuum_kinetic() < STILL * live.edge.continuum_mass() * unit;
+        live.course.resting = if still {
+            live.course.resting + 1.0
+        } else {
+            0.0
+        };
+        live.course.resting >= STILL_LOOKS
+    }
+}
+
+impl Recipe for JoinedColumn<'_> {
+    fn about(&self) -> String {
+        format!(
+            "{}; what lies within {:.4} m of the wall is a continuum",
+            self.scene.about(),
+            self.scene.edge()
+        )
+    }
+
+    fn materials(&self, origin: &str) -> Result<Materials, Failure> {
+        self.scene.materials(origin)
+    }
+
+    fn contact(&self) -> &LawKeys {
+        self.scene.contact()
+    }
+
+    fn seed(&self) -> u64 {
+        self.scene.seed()
+    }
+
+    fn coarse_graining(&self) -> f64 {
+        1.0
+    }
+
+    fn step(&self) -> &StepKeys {
+        self.scene.step()
+    }
+
+    fn output(&self) -> &OutputKeys {
+        self.scene.output()
+    }
+
+    fn packing(&self) -> Option<&str> {
+        self.scene.packing()
+    }
+
+    fn provenance(&self) -> Option<toml::Table> {
+        self.scene.provenance()
+    }
+
+    fn prepare(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure> {
+        self.scene.prepare(shop, origin)
+    }
+
+    fn world(
+        &self,
+        packing: &Packing,
+        materials: &Materials,
+        origin: &str,
+    ) -> Result<World, Failure> {
+        self.scene.world(packing, materials, origin)
+    }
+
+    fn expected(&self, materials: &Materials) -> Expected {
+        let all = self.scene.expected(materials);
+        Expected {
+            grains: all.grains * self.expected_share(),
+            ..all
+        }
+    }
+
+    fn left_out(&self) -> Vec<&'static str> {
+        let mut own = self.scene.left_out();
+        own.extend([
+            "granular temperature and dilatancy of the continuum",
+            "spins across the edge",
+            "exchange of mass through the edge (it moves with the material)",
+        ]);
+        own
+    }
+
+    fn plan(&self) -> Vec<(String, String)> {
+        self.zones_in_words()
+    }
+
+    fn steer_every(&self, timestep: f64) -> u64 {
+        let settings = self.scene.overlap_settings(&self.origin);
+        settings.map_or(u64::MAX, |s| MaterialEdge::steps_of_loads(&s, timestep))
+    }
+
+    fn steer(&self, simulation: &mut Simulation, state: &mut Vec<f64>) -> Result<Course, Failure> {
+        let mut guard = self.live();
+        if state.is_empty() {
+            let live = self.begin(simulation)?;
+            Self::remember(&live, state);
+            *guard = Some(live);
+            return Ok(Course::On);
+        }
+        if guard.is_none() {
+            *guard = Some(self.recalled(simulation, state)?);
+        }
+        let Some(live) = guard.as_mut() else {
+            return Ok(Course::On);
+        };
+        live.edge.go_on(simulation).map_err(failure)?;
+        if !live.edge.at_exchange() {
+            live.edge.write_over(&mut state[HEAD..]);
+            return Ok(Course::On);
+        }
+        let mut over = false;
+        if live
+            .edge
+            .exchanges()
+            .is_multiple_of(self.exchanges_of_a_front(&live.edge))
+        {
+            let profile = live.course.fronts.len().is_multiple_of(PROFILE_EVERY);
+            self.see(simulation, live, profile);
+            over = self.rests(simulation, live);
+        }
+        Self::remember(live, state);
+        Ok(if over { Course::Over } else { Course::On })
+    }
+
+    fn columns(&self) -> Vec<(String, &'static str)> {
+        [
+            ("x_front", "m"),
+            ("height", "m"),
+            ("continuum_kinetic", "J"),
+            ("edge_foot", "m"),
+            ("edge_top", "m"),
+        ]
+        .map(|(name, unit)| (name.to_owned(), unit))
+        .to_vec()
+    }
+
+    fn look(&self, _: &mut Simulation, _: &Snapshot, _: &[f64]) -> Vec<f64> {
+        let guard = self.live();
+        let Some(live) = guard.as_ref() else {
+            return vec![f64::NAN; 5];
+        };
+        let last = live.course.fronts.last();
+        let [_, front, height] = last.copied().unwrap_or([f64::NAN; 3]);
+        let places = live.edge.handshake();
+        let end = |place: Option<&f64>| place.copied().unwrap_or(f64::NAN);
+        vec![
+            front,
+            height,
+            live.edge.continuum_kinetic(),
+            end(places.first()),
+            end(places.last()),
+        ]
+    }
+
+    fn conclude(&self, ran: &mut Ran, summary: &mut Summary) -> Result<Vec<Table>, Failure> {
+        self.find(ran, summary)
+    }
+
+    fn compared(&self) -> Vec<&'static str> {
+        self.scene.compared()
+    }
+}

@@ -1,0 +1,389 @@
+//! What a joined column has found, and its plan.
+
+use super::JoinedColumn;
+use crate::failure::Failure;
+use crate::run::column_of_grains::{FLOOR, STILL_LOOKS};
+use crate::run::heap::edge;
+use crate::run::world::Ran;
+use crate::scene::{ColumnFloorKind, DENSE};
+use crate::state_hash;
+use crate::summary::{Figure, Quantity, Summary};
+use crate::table::Table;
+use colluvium_coupling::overlap::material_edge::MaterialEdge;
+
+/// Limits of the monitors: slip over √(g H), ratio of forces less 1, share of the relaxation.
+const MOST_SLIP: f64 = 0.01;
+const MOST_RATIO: f64 = 0.05;
+const MOST_RELAXATION: f64 = 0.1;
+
+impl JoinedColumn<'_> {
+    /// Share of the column's grains, floor included, that are left as grains.
+    pub(super) fn expected_share(&self) -> f64 {
+        let scene = self.scene;
+        let d = scene.grains.diameter;
+        let floor = match scene.grains.floor {
+            ColumnFloorKind::Rough => FLOOR[0] * scene.slab() / (d * d),
+            ColumnFloorKind::Smooth => 0.0,
+        };
+        let column = DENSE * scene.height * scene.slab() / scene.grain_volume();
+        let all = column * scene.width() + floor * scene.length();
+        (all - (column + floor) * scene.edge()) / all
+    }
+
+    /// Where grains end and why, and what joins them.
+    pub(super) fn zones_in_words(&self) -> Vec<(String, String)> {
+        let scene = self.scene;
+        let d = scene.grains.diameter;
+        let why = match scene.zones.edge_scaled {
+            Some(_) => "given",
+            None => "computed: what lies 0.8 heights behind the end of the foot hardly flows",
+        };
+        let mut lines = vec![(
+            "zones".to_owned(),
+            format!(
+                "continuum from the wall to x = {:.4} m ({:.1} d; zones.edge_scaled = {:.4}: {why}), grains beyond; {:.0} % of the \
+                 grain-steps of a column of grains",
+                scene.edge(),
+                scene.edge() / d,
+                scene.edge() / scene.height,
+                100.0 * self.expected_share()
+            ),
+        )];
+        if let Ok(s) = scene.overlap_settings(&self.origin) {
+            lines.push((
+                "overlap".into(),
+                format!(
+                    "from the edge into the grains: shell {:.1} d, buffer {:.1} d, inner overlap {:.1} d; loads held {:.2e} s, exchange every \
+                     {:.2e} s, stresses averaged over {:.2e} s, relaxation {:.2e} s, following {:.2e} s, impedance {:.3e} Pa s/m",
+                    s.shell / d,
+                    s.buffer / d,
+                    s.inner / d,
+                    s.load_time,
+                    s.exchange_time,
+                    s.stress_time,
+                    s.relaxation_time,
+                    s.following_time,
+                    s.impedance
+                ),
+            ));
+        }
+        let law = match scene.grains.calibrated.word() {
+            Some(word) => format!("the law calibrated for `{word}` (|τ|/p)"),
+            None => "that of [rheology]".into(),
+        };
+        lines.push((
+            "continuum".into(),
+            format!("{law}, cells of {:.2} d", scene.spacing() / d),
+        ));
+        lines
+    }
+
+    /// Results of the run for the summary, and tables.
+    pub(super) fn find(&self, ran: &mut Ran, summary: &mut Summary) -> Result<Vec<Table>, Failure> {
+        let scene = self.scene;
+        let mut live = self.recalled(&ran.simulation, &ran.state)?;
+        let axis = scene.heap_axis();
+        let places = axis.positions();
+        let deposit = self.heights(&ran.simulation, &live, 1.0, |_| true);
+        let front = edge(&places, &deposit, scene.threshold());
+        if live
+            .course
+            .fronts
+            .last()
+            .is_none_or(|f| f[0] < ran.simulation.time())
+        {
+            self.see(&ran.simulation, &mut live, false);
+        }
+        let half = |upper: bool| {
+            let across = |y: f64| (y.rem_euclid(scene.slab()) > 0.5 * scene.slab()) == upper;
+            let heights = self.heights(&ran.simulation, &live, 0.5, across);
+            edge(&places, &heights, scene.threshold())
+        };
+        let error = 0.5 * (half(true) - half(false)).abs();
+        let width = scene.width();
+        let highest = deposit.iter().copied().fold(0.0, f64::max);
+        let rests = live.course.resting >= STILL_LOOKS;
+        let time = if rests {
+            ran.simulation.time()
+        } else {
+            f64::NAN
+        };
+        let m = |value: f64| Quantity::new(value, "m");
+        let one = |value: f64| Quantity::new(value, "1");
+        for (name, quantity, source) in [
+            (
+                "x_front",
+                m(front).with_error(error),
+                "where the heap is front_height_scaled high; error from both halves of the slab",
+            ),
+            (
+                "runout_scaled",
+                one((front - width) / width).with_error(error / width),
+                "(x_front − width)/width",
+            ),
+            ("deposit_height", m(highest), "greatest height at the end"),
+            (
+                "wall_height",
+                m(deposit[0]),
+                "height beside the wall at the end",
+            ),
+            (
+                "time_of_rest",
+                Quantity::new(time, "s"),
+                "kinetic energies of both sides below 1e-4 m g d a grain; null where the run ended before",
+            ),
+            (
+                "solid_fraction",
+                one(live.course.solid_fraction),
+                "in the middle of the column before; that of the continuum",
+            ),
+        ] {
+            summary.put(name, quantity.from(source));
+        }
+        if front >= places[places.len() - 2] {
+            summary.remarks.push(
+                "The heap reached the end of the floor: grid.length_scaled is too small for its run-out."
+                    .into(),
+            );
+        }
+        if !rests {
+            summary
+                .remarks
+                .push("Still moving at the end: duration_scaled is too short.".into());
+        }
+        self.book(ran, &live.edge, summary);
+        self.watch(&live.edge, summary);
+        summary.state_hash = state_hash::of_hashes(
+            [ran.simulation.state_hash(), state_hash::of(&[&ran.state])]
+                .iter()
+                .map(String::as_str),
+        );
+        let mut tables = live.course.tables(places.clone(), deposit.clone());
+        tables.extend(sides(self, ran, &live.edge, (places, deposit)));
+        summary.figures.insert(
+            0,
+            Figure::Curves {
+                table: "sides".into(),
+                x: ["x".into(), "x [m]".into()],
+                y_label: "height h [m]".into(),
+                y: [
+                    ["h", "both"],
+                    ["grains", "grains, overlap included"],
+                    ["continuum", "continuum, overlap included"],
+                    ["handshake", "handshake surface"],
+                ]
+                .map(|pair| pair.map(String::from))
+                .to_vec(),
+                log: false,
+                caption: "The deposit: grains in front, continuum behind, and where totals change from one to the other."
+                    .into(),
+            },
+        );
+        Ok(tables)
+    }
+
+    /// Cost, mass and momentum.
+    fn book(&self, ran: &mut Ran, edge: &MaterialEdge, summary: &mut Summary) {
+        let steps = ran.simulation.steps_done();
+        let [before, now] = [ran.packing.grains.len(), ran.simulation.grain_count()];
+        let spared = steps * (before - now) as u64;
+        summary.cost.grain_steps = summary.cost.grain_steps.saturating_sub(spared);
+        let monitors = edge.monitors();
+        summary.cost.cell_steps = monitors.steps[1] as u64;
+        if summary.cost.wall_s > 0.0 {
+            summary.cost.grain_steps_per_s = summary.cost.grain_steps as f64 / summary.cost.wall_s;
+            summary.cost.cell_steps_per_s = monitors.steps[1] / summary.cost.wall_s;
+        }
+        summary.model.grains = now as u64;
+        summary.model.cells = edge.cells().count() as u64;
+        summary.put(
+            "grain_steps_share",
+            Quantity::new(now as f64 / before as f64, "1")
+                .from("grains of the run over those of the whole column, floor included"),
+        );
+        let account = edge.account(&ran.simulation);
+        let grains = account.grains_error(edge.grain_momentum(&mut ran.simulation));
+        let exchange = account.exchange_error(edge.owed(&ran.simulation));
+        summary.ledger.mass_relative = edge.volume_error();
+        summary.put(
+            "handshake_mass",
+            Quantity::new(edge.mass_error(&ran.simulation), "1").against(
+                0.0,
+                "mass of grains and continuum on their sides of the handshake surface over that at the start, less 1",
+            ),
+        );
+        summary.ledger.momentum_relative = Some(grains.max(exchange));
+        for (name, value, source) in [
+            (
+                "ledger_grains",
+                grains,
+                "momentum of the grains against its account, relative to the largest entry",
+            ),
+            (
+                "ledger_exchange",
+                exchange,
+                "what the relaxation gave to both sides, relative to the largest entry",
+            ),
+        ] {
+            summary.put(name, Quantity::new(value, "1").against(0.0, source));
+        }
+        let walls = account.from_walls_and_surface(edge.continuum_momentum());
+        for (name, [x, z], source) in [
+            ("weight", account.weight, "of the grains"),
+            (
+                "traction",
+                account.traction,
+                "of the continuum on the grains",
+            ),
+            ("impedance", account.impedance, "on the grains"),
+            (
+                "relaxation",
+                account.relaxation,
+                "on the grains; the continuum takes the opposite",
+            ),
+            (
+                "following",
+                account.following,
+                "that the copy was given when it was made anew from the grains",
+            ),
+            (
+                "untaken",
+                account.untaken,
+                "of the relaxation on cells that had no velocity of their own to take it",
+            ),
+            (
+                "continuum_walls",
+                walls,
+                "that the continuum had from walls, floor and the stress on its surface: what is left of its momentum",
+            ),
+        ] {
+            for (axis, value) in [("x", x), ("z", z)] {
+                let name = format!("impulse_{name}_{axis}");
+                summary.put(&name, Quantity::new(value, "N s").from(source));
+            }
+        }
+    }
+
+    /// What the monitors say, and in words what they should not.
+    fn watch(&self, edge: &MaterialEdge, summary: &mut Summary) {
+        let monitors = edge.monitors();
+        let unit = (self.scene.gravity * self.scene.height).sqrt();
+        let slip = monitors.mean_slip() / unit;
+        let ratio = monitors.force_ratio();
+        let share = monitors.relaxation_share();
+        for (name, value, right, source) in [
+            (
+                "slip",
+                slip,
+                0.0,
+                "rms difference of mean velocities at the handshake surface over √(g height), mean in time; to be below 1 %",
+            ),
+            (
+                "largest_slip",
+                monitors.largest_slip / unit,
+                0.0,
+                "the same, at its largest",
+            ),
+            (
+                "force_ratio",
+                ratio,
+                1.0,
+                "of σ_xx through the handshake surface, grains over continuum, means in time; to be within 5 %",
+            ),
+            (
+                "overlap_packing",
+                monitors.packing_ratio(),
+                1.0,
+                "mass of the grains in full cells of the overlap over that of the continuum there",
+            ),
+            (
+                "relaxation_share",
+                share,
+                0.0,
+                "impulse of the relaxation over that of the traction; to be below 10 %",
+            ),
+            (
+                "grains_escaped",
+                monitors.escaped,
+                0.0,
+                "most grains beyond the edge by more than a diameter, at any exchange",
+            ),
+        ] {
+            summary.put(name, Quantity::new(value, "1").against(right, source));
+        }
+        summary.put(
+            "momentum_residual",
+            Quantity::new(monitors.residual, "1").from("of the continuum, largest of any step"),
+        );
+        let misses = [
+            (slip > MOST_SLIP, "the slip", slip),
+            (
+                (ratio - 1.0).abs() > MOST_RATIO,
+                "the ratio of forces",
+                ratio,
+            ),
+            (share > MOST_RELAXATION, "the share of relaxation", share),
+            (
+                monitors.escaped > 0.0,
+                "the number of grains beyond the edge",
+                monitors.escaped,
+            ),
+        ];
+        for (_, what, value) in misses.into_iter().filter(|(misses, ..)| *misses) {
+            summary
+                .remarks
+                .push(format!("Overlap: {what} is {value:.4}, outside its limit."));
+        }
+    }
+}
+
+/// Both sides by themselves, copies included, and the handshake surface.
+fn sides(
+    column: &JoinedColumn,
+    ran: &Ran,
+    edge: &MaterialEdge,
+    (places, deposit): (Vec<f64>, Vec<f64>),
+) -> Vec<Table> {
+    let scene = column.scene;
+    let base = edge.spec().case.rheology.solid_fraction * scene.slab();
+    let free = ran.seen.grains.iter().filter(|g| !g.fixed);
+    let volume = |radius: f64| 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
+    let grains = scene
+        .heap_axis()
+        .heights(free.map(|g| [g.position.x, volume(g.radius)]), base);
+    let (xs, heights) = edge.continuum_heights();
+    let spacing = edge.cells().spacing;
+    let continuum = places
+        .iter()
+        .map(|x| heights.get((x / spacing) as usize).copied().unwrap_or(0.0));
+    let continuum: Vec<f64> = continuum.collect();
+    // Height to which the material lies behind the handshake surface over each place.
+    let surface = edge.handshake();
+    let handshake = places.iter().zip(&deposit).map(|(x, h)| {
+        let rows = surface.iter().filter(|place| *place < x).count();
+        (rows as f64 * spacing).min(*h)
+    });
+    let handshake = handshake.collect();
+    let fields = edge.collapse().fields();
+    let middle = |c: &colluvium_continuum::free_surface::CellFields, axis: usize| {
+        0.5 * (c.lower[axis] + c.upper[axis])
+    };
+    debug_assert_eq!(xs.len(), heights.len());
+    vec![
+        Table::new("sides")
+            .with("x", "m", places)
+            .with("h", "m", deposit)
+            .with("grains", "m", grains)
+            .with("continuum", "m", continuum)
+            .with("handshake", "m", handshake),
+        Table::new("continuum")
+            .with("x", "m", fields.iter().map(|c| middle(c, 0)).collect())
+            .with("z", "m", fields.iter().map(|c| middle(c, 1)).collect())
+            .with("fraction", "1", fields.iter().map(|c| c.fraction).collect())
+            .with("u", "m/s", fields.iter().map(|c| c.velocity[0]).collect())
+            .with("w", "m/s", fields.iter().map(|c| c.velocity[1]).collect())
+            .with("p", "Pa", fields.iter().map(|c| c.pressure).collect())
+            .with("s", "Pa", fields.iter().map(|c| c.stress[0]).collect())
+            .with("tau", "Pa", fields.iter().map(|c| c.stress[1]).collect()),
+    ]
+}

@@ -1,0 +1,192 @@
+//! Keys of a column that is grains in front and a continuum behind, of the collapse with `model = "hybrid"`.
+
+use super::world::Place;
+use super::{CollapseScene, SceneError};
+use colluvium_coupling::overlap::{NormalMotion, OverlapError, OverlapSettings, Resolved, Scales};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Where there are grains.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ColumnZoneKeys {
+    /// Distance over the column's height at which grains begin, from the wall; what is left out is computed.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 50.0))]
+    pub edge_scaled: Option<f64>,
+}
+
+/// The overlap of both, from the edge into the grains. What is left out is computed; `colluvium plan` says it.
+#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ColumnOverlapKeys {
+    /// Width of the inner overlap, where stresses of grains enter the continuum, in diameters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
+    pub inner_diameters: Option<f64>,
+    /// Width of the buffer, where mean velocities relax to each other, in diameters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
+    pub buffer_diameters: Option<f64>,
+    /// Width of the shell of grains that bears the continuum's traction, in diameters.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
+    pub shell_diameters: Option<f64>,
+    /// Time over which stresses of grains are averaged (s).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
+    pub stress_time: Option<f64>,
+    /// Time in which mean velocities in the buffer relax to each other (s).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
+    pub relaxation_time: Option<f64>,
+    /// Time in which the continuum follows the grains in the inner overlap (s).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
+    pub following_time: Option<f64>,
+    /// Time between two exchanges (s).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
+    pub exchange_time: Option<f64>,
+    /// Time for which forces on grains of the overlap are held (s).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
+    pub load_time: Option<f64>,
+    /// Acoustic impedance of the edge (Pa s/m).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minimum" = 0.0, "maximum" = 1.0e15))]
+    pub impedance: Option<f64>,
+    /// Neither side acts on the other: what a coupling has to do better than.
+    #[serde(default)]
+    pub uncoupled: bool,
+}
+
+impl ColumnOverlapKeys {
+    /// The settings, for grains of this mean diameter (m).
+    fn settings(&self, diameter: f64) -> OverlapSettings {
+        let length = |diameters: Option<f64>| diameters.map(|n| n * diameter);
+        OverlapSettings {
+            inner: length(self.inner_diameters),
+            buffer: length(self.buffer_diameters),
+            shell: length(self.shell_diameters),
+            stress_time: self.stress_time,
+            relaxation_time: self.relaxation_time,
+            following_time: self.following_time,
+            exchange_time: self.exchange_time,
+            load_time: self.load_time,
+            impedance: self.impedance,
+            normal_motion: Some(NormalMotion::Held),
+            uncoupled: self.uncoupled,
+            ..OverlapSettings::default()
+        }
+    }
+}
+
+/// Solid fraction of a settled column, before it is there to be measured.
+pub const DENSE: f64 = 0.57;
+/// Column heights in front of the foot's end that begin to flow: a collapse fails along a plane from there, which
+/// in grains of friction 0.5 to 0.6 is 55 to 60 degrees steep, and its surface eats its way back beyond that.
+const FLOWS: f64 = 0.8;
+/// Fewest diameters of continuum behind the edge, and of grains in front of the overlap.
+const LEAST_CONTINUUM: f64 = 3.0;
+const LEAST_GRAINS: f64 = 4.0;
+
+impl CollapseScene {
+    /// Distance of the edge from the wall (m), given or computed.
+    pub fn edge(&self) -> f64 {
+        match self.zones.edge_scaled {
+            Some(scaled) => scaled * self.height,
+            None => {
+                let d = self.grains.diameter;
+                let widths = [self.overlap.inner_diameters, self.overlap.buffer_diameters];
+                let overlap: f64 = widths.iter().map(|w| w.unwrap_or(3.0) * d).sum();
+                self.width() - (FLOWS * self.height).max(overlap + LEAST_GRAINS * d)
+            }
+        }
+    }
+
+    /// The overlap's settings with nothing left out.
+    pub fn overlap_settings(&self, origin: &str) -> Result<Resolved, SceneError> {
+        let (d, grains) = (self.grains.diameter, &self.grains);
+        let mass = grains.density * std::f64::consts::PI / 6.0 * d.powi(3);
+        let law = self.law_keys();
+        let scales = Scales {
+            diameter: d,
+            time: (d / self.gravity).sqrt(),
+            density: DENSE * grains.density,
+            // Grains without springs of a fixed stiffness are as stiff as the scaled key says.
+            stiffness: law
+                .stiffness
+                .unwrap_or(grains.stiffness_scaled * mass * self.gravity / d),
+        };
+        let settings = self.overlap.settings(d).resolve(&scales, false);
+        settings.map_err(|error| match error {
+            OverlapError::OutOfRange {
+                key,
+                value,
+                allowed,
+            } => {
+                let length = ["inner", "buffer", "shell"].contains(&key);
+                let (key, unit) = match length {
+                    true => (format!("overlap.{key}_diameters"), d),
+                    false => (format!("overlap.{key}"), 1.0),
+                };
+                SceneError::OutOfRange {
+                    file: origin.to_owned(),
+                    key,
+                    // Diameters there and back leave digits behind that nobody wrote.
+                    value: ((value / unit * 1e9).round() / 1e9).to_string(),
+                    range: allowed.to_owned(),
+                }
+            }
+            other => SceneError::Unreadable {
+                file: origin.to_owned(),
+                message: other.to_string(),
+            },
+        })
+    }
+
+    /// What a joined column needs beyond one of grains.
+    pub(super) fn check_zones(&self, origin: &str) -> Result<(), SceneError> {
+        self.check_grains(origin)?;
+        let at = |section| Place { origin, section };
+        if self.overhang_degrees != 0.0 {
+            let range = "0 with model = \"hybrid\": the column's face stands upright";
+            return Err(at("").refuse("overhang_degrees", self.overhang_degrees, range));
+        }
+        let settings = self.overlap_settings(origin)?;
+        let (d, h) = (self.grains.diameter, self.height);
+        let overlap = settings.inner + settings.buffer;
+        let least = (LEAST_CONTINUUM * d).max(2.0 * self.spacing()) / h;
+        let most = (self.width() - overlap - LEAST_GRAINS * d) / h;
+        if least >= most {
+            let range = format!(
+                "smaller: a column of width {:.4} m has no room for {:.4} m of continuum, an overlap of {overlap:.4} m and {:.4} m of \
+                 grains; at least {:.4} m",
+                self.width(),
+                least * h,
+                LEAST_GRAINS * d,
+                least * h + overlap + LEAST_GRAINS * d
+            );
+            return Err(at("").refuse("aspect", self.aspect, &range));
+        }
+        let edge = self.edge() / h;
+        if !(least..=most * (1.0 + 1e-12)).contains(&edge) {
+            let range = format!("[{least:.4}, {most:.4}] for this column and overlap");
+            return match self.zones.edge_scaled {
+                Some(_) => Err(at("zones").refuse("edge_scaled", edge, &range)),
+                None => Err(at("zones").refuse(
+                    "edge_scaled",
+                    format!("{edge:.4} (computed: what lies {FLOWS} heights behind the foot hardly flows)"),
+                    format!("{range}: a column of smaller aspect, or an edge of your own"),
+                )),
+            };
+        }
+        Ok(())
+    }
+
+    /// Edge of a cell of the grid (m).
+    pub fn spacing(&self) -> f64 {
+        self.grid.length_scaled * self.height / self.cells() as f64
+    }
+}

@@ -1,0 +1,166 @@
+//! A column that is grains in front and a continuum behind, from the command line.
+
+#![allow(clippy::unwrap_used)] // a test may panic
+
+mod command;
+
+use command::{SMALL_JOINED_COLUMN, colluvium, hash, succeed, summary, table, value};
+use std::path::Path;
+
+fn arguments<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+    let mut list = vec!["run", "column-collapse", "--out", out];
+    for set in SMALL_JOINED_COLUMN.iter().chain(more) {
+        list.extend(["--set", set]);
+    }
+    list
+}
+
+/// Area below a profile: of the deposit, or of the first instant of profiles (m²).
+fn area(folder: &Path, file: &str) -> f64 {
+    let (header, rows) = table(&folder.join(file));
+    let column = |name: &str| header.iter().position(|h| h == name).unwrap();
+    let (x, h) = (column("x"), column("h"));
+    let spacing = rows[1][x] - rows[0][x];
+    let first = header.iter().position(|h| h == "t");
+    let of_first = |row: &&Vec<f64>| first.is_none_or(|t| row[t] == rows[0][t]);
+    rows.iter()
+        .filter(of_first)
+        .map(|row| row[h] * spacing)
+        .sum()
+}
+
+/// Of the same settled column: all grains, joined with one thread and with two, and with nothing exchanged. The joint
+/// runs out as the grains do and keeps all books; what exchanges nothing falls into the gap.
+#[test]
+fn a_joined_column_collapses_as_its_grains_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let [dem, none] = [["model=dem"], ["overlap.uncoupled=true"]];
+    succeed(folder.path(), &arguments("grains", &dem));
+    let mut one = arguments("joined", &[]);
+    one.extend(["--threads", "1"]);
+    succeed(folder.path(), &one);
+    let mut two = arguments("two", &[]);
+    two.extend(["--threads", "2"]);
+    succeed(folder.path(), &two);
+    assert_eq!(hash(&at("joined")), hash(&at("two")));
+    succeed(folder.path(), &arguments("control", &none));
+
+    let [grains, joined, control] = ["grains", "joined", "control"].map(|name| summary(&at(name)));
+    for name in ["x_front", "runout_scaled", "deposit_height"] {
+        let all = [&grains, &joined, &control].map(|s| value(s, name));
+        println!(
+            "{name}: grains {:.4}, joined {:.4}, nothing exchanged {:.4}",
+            all[0], all[1], all[2]
+        );
+    }
+    for name in [
+        "slip",
+        "largest_slip",
+        "force_ratio",
+        "overlap_packing",
+        "relaxation_share",
+        "grains_escaped",
+        "handshake_mass",
+        "ledger_grains",
+        "ledger_exchange",
+        "grain_steps_share",
+    ] {
+        println!(
+            "{name}: joined {:.3e}, control {:.3e}",
+            value(&joined, name),
+            value(&control, name)
+        );
+    }
+    // Books.
+    assert!(value(&joined, "ledger_grains") < 1e-10);
+    assert!(value(&joined, "ledger_exchange") < 1e-10);
+    assert!(joined["ledger"]["mass_relative"].as_f64().unwrap().abs() < 1e-12);
+    assert!(value(&joined, "handshake_mass").abs() < 0.01);
+    let [before, after] = ["profiles.csv", "deposit.csv"].map(|file| area(&at("joined"), file));
+    assert!((after / before - 1.0).abs() < 0.01, "{before} {after}");
+    // The same heap as all grains leave, within what two runs of so few grains differ by; without an exchange the
+    // continuum's foot and the grains' back fall into each other.
+    let heap = |name: &str| table(&at(name).join("deposit.csv")).1;
+    let grains_heap = heap("grains");
+    let apart = |name: &str| {
+        let (own, all) = (heap(name), grains_heap.iter());
+        let miss: f64 = own.iter().zip(all).map(|(a, b)| (a[1] - b[1]).abs()).sum();
+        miss / grains_heap.iter().map(|row| row[1]).sum::<f64>()
+    };
+    let (joint, without) = (apart("joined"), apart("control"));
+    println!("deposits apart: joined {joint:.4}, nothing exchanged {without:.4}");
+    assert!(joint < 0.06 && without > 0.08, "{joint} {without}");
+    assert_eq!(value(&joined, "grains_escaped"), 0.0);
+    assert!(value(&control, "grains_escaped") > 10.0);
+    assert!(value(&joined, "grain_steps_share") < 0.75);
+    let report = std::fs::read_to_string(at("joined").join("report.html")).unwrap();
+    assert!(report.contains("handshake"));
+}
+
+#[test]
+fn bad_joined_columns_are_refused_by_key() {
+    let folder = tempfile::tempdir().unwrap();
+    for (sets, key, allowed) in [
+        (
+            &["aspect=1.5", "grains.width_diameters=5"][..],
+            "aspect",
+            "has no room",
+        ),
+        (&["zones.edge_scaled=0.1"], "zones.edge_scaled", "[0.3"),
+        (
+            &["zones.edge_scaled=2.5"],
+            "zones.edge_scaled",
+            "for this column",
+        ),
+        (&["zones.edges=1"], "zones.edges", "edge_scaled"),
+        (&["overhang_degrees=10"], "overhang_degrees", "upright"),
+        (
+            &["overlap.shell_diameters=5"],
+            "overlap.shell_diameters",
+            "at most the buffer",
+        ),
+        (
+            &["overlap.load_time=1"],
+            "overlap.load_time",
+            "at most the time",
+        ),
+        (
+            &["overlap.height_diameters=5"],
+            "overlap.height_diameters",
+            "inner_diameters",
+        ),
+        (
+            &["side_walls={width=1.0,friction=0.2}"],
+            "side_walls",
+            "periodic across",
+        ),
+    ] {
+        let refused = colluvium(folder.path(), &arguments("x", sets));
+        let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert_eq!(refused.status.code(), Some(2), "{sets:?}: {message}");
+        assert!(
+            message.contains(key) && message.contains(allowed),
+            "{sets:?}: {message}"
+        );
+        assert!(!folder.path().join("x").exists());
+    }
+}
+
+#[test]
+fn the_plan_says_where_grains_end_and_why() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut plan = arguments("x", &[]);
+    plan[0] = "plan";
+    plan.drain(2..4);
+    let said = succeed(folder.path(), &plan);
+    for word in [
+        "zones",
+        "overlap",
+        "computed",
+        "of the grain-steps",
+        "moderate",
+    ] {
+        assert!(said.contains(word), "{word}: {said}");
+    }
+}
