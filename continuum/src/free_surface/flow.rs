@@ -102,6 +102,8 @@ pub struct SurfaceStep {
     pub newton_iterations: usize,
     /// Steps that were cut and tried again.
     pub cuts: usize,
+    /// Points whose friction went by the pressure before the step ([`crate::yield_step::StepReport::held_points`]).
+    pub held_points: usize,
     /// Residuals of the equations.
     pub residuals: Residuals,
     /// Largest speed of material.
@@ -652,6 +654,7 @@ impl<R: Rheology> SurfaceFlow<R> {
         self.spent.newton += clock.elapsed().as_secs_f64();
         record.newton_iterations += report.iterations;
         record.residuals = report.residuals;
+        record.held_points = report.held_points;
         if report.converged {
             self.scatter(&faces, &places, dt);
         }
