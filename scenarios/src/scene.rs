@@ -18,6 +18,7 @@ mod collapse_terrain;
 mod comet;
 mod error;
 mod friction_keys;
+mod friction_law;
 mod grains;
 mod impact;
 mod incline;
@@ -47,6 +48,7 @@ pub use collapse_grains::{CalibratedKind, ColumnFloorKind, ColumnGrainKeys};
 pub use collapse_terrain::{ContactKind, TerrainKeys};
 pub use comet::{CometBlockKeys, CometKeys, MixKind, Softness};
 pub use error::SceneError;
+pub use friction_law::LawVisitor;
 pub use grains::GrainsScene;
 pub use impact::{ImpactScene, RollingKeys};
 pub use incline::{

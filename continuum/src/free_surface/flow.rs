@@ -46,7 +46,7 @@ impl Default for SurfaceOptions {
     fn default() -> Self {
         Self {
             courant: 0.45,
-            largest_step: 0.05,
+            largest_step: 0.1,
             growth: 1.3,
             thin_layer: ThinLayer::default(),
             solver: PrimalDualOptions {

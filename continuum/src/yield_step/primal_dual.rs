@@ -75,7 +75,7 @@ const SMALLEST_STRAIN_RATE_FLOOR: f64 = 1e-7;
 const MOST_HELD_ROUNDS: usize = 4;
 /// Iterations after which a start from the previous stress at the final ε is given up in favour of
 /// a cold start.
-const WARM_ITERATIONS: usize = 12;
+const WARM_ITERATIONS: usize = 20;
 
 /// Relative residual to which the linear system of a Newton iteration is solved when it is solved
 /// iteratively: a tighter one saves no iteration.
