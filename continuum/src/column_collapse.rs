@@ -15,14 +15,14 @@ use serde::{Deserialize, Serialize};
 use crate::error::{Error, require};
 use crate::free_surface::{CellFields, SurfaceFlow, SurfaceOptions, SurfaceState, SurfaceStep};
 use crate::grid::{Axis, Boundary, Grid};
-use crate::rheology::{MuI, Rheology};
+use crate::rheology::{MuI, ShearLaw};
 use crate::units::Units;
 use crate::wall_friction::SideWalls;
 
 /// A column to collapse; SI units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields)]
-pub struct CollapseCase {
+pub struct CollapseCase<L = MuI> {
     /// Aspect ratio a = height over width.
     pub aspect: f64,
     /// Height H of the column (m).
@@ -30,7 +30,7 @@ pub struct CollapseCase {
     /// Gravity (m/s²).
     pub gravity: f64,
     /// The material.
-    pub rheology: MuI,
+    pub rheology: L,
     /// Cells along x.
     pub cells: usize,
     /// Length of the grid over the height of the column.
@@ -47,12 +47,19 @@ const FEWEST_CELLS: f64 = 4.0;
 /// Material counts as at rest when nothing moves faster than this many ε H.
 const REST_SPEED: f64 = 5.0;
 
-impl CollapseCase {
+impl<L> CollapseCase<L> {
     /// Width L = H/a of the column (m).
     pub fn width(&self) -> f64 {
         self.height / self.aspect
     }
 
+    /// tan of the angle by which the face leans out.
+    fn overhang(&self) -> f64 {
+        self.overhang_degrees.to_radians().tan()
+    }
+}
+
+impl<L: ShearLaw + Clone> CollapseCase<L> {
     /// Refuses parameters out of range.
     ///
     /// # Errors
@@ -93,11 +100,6 @@ impl CollapseCase {
         )
     }
 
-    /// tan of the angle by which the face leans out.
-    fn overhang(&self) -> f64 {
-        self.overhang_degrees.to_radians().tan()
-    }
-
     /// Natural units of the computation: height, bulk density, √(g H).
     pub fn units(&self) -> Units {
         Units::of_gravity(self.height, self.rheology.bulk_density(), self.gravity)
@@ -118,7 +120,7 @@ impl CollapseCase {
     }
 
     /// The column at rest, in natural units.
-    fn flow(&self, options: &SurfaceOptions) -> Result<SurfaceFlow<MuI>, Error> {
+    fn flow(&self, options: &SurfaceOptions) -> Result<SurfaceFlow<L>, Error> {
         let spacing = self.length_scaled / self.cells as f64;
         let rows = (ROOM_ABOVE / spacing).ceil().max(1.0) as usize;
         let grid = self.grid(spacing, rows)?;
@@ -136,7 +138,7 @@ impl CollapseCase {
     }
 }
 
-impl CollapseCase {
+impl<L> CollapseCase<L> {
     /// Share of a cell of the grid that the column covers: below its top, and behind its face, which leans out
     /// by `tan θ` a unit of height. Exact: the mean over the covered rows of `clamp(x_face(z)/h - i, 0, 1)`.
     fn covered(&self, spacing: f64, i: usize, k: usize) -> f64 {
@@ -172,10 +174,10 @@ pub struct Front {
 }
 
 /// A collapse under way.
-pub struct Collapse {
-    case: CollapseCase,
+pub struct Collapse<L = MuI> {
+    case: CollapseCase<L>,
     units: Units,
-    flow: SurfaceFlow<MuI>,
+    flow: SurfaceFlow<L>,
     rest_speed: f64,
     start_volume: f64,
     /// Height of the lower edge of the grid (m).
@@ -183,12 +185,12 @@ pub struct Collapse {
     ground: Option<CollapseGround>,
 }
 
-impl Collapse {
+impl<L: ShearLaw + Clone> Collapse<L> {
     /// The column before it is let go.
     ///
     /// # Errors
     /// Parameters or settings out of range.
-    pub fn new(case: &CollapseCase, options: &SurfaceOptions) -> Result<Self, Error> {
+    pub fn new(case: &CollapseCase<L>, options: &SurfaceOptions) -> Result<Self, Error> {
         case.validate()?;
         Ok(Self::of_flow(case, options, case.flow(options)?))
     }
@@ -198,7 +200,7 @@ impl Collapse {
     /// # Errors
     /// Parameters or settings out of range.
     pub fn between_side_walls(
-        case: &CollapseCase,
+        case: &CollapseCase<L>,
         options: &SurfaceOptions,
         walls: SideWalls,
     ) -> Result<Self, Error> {
@@ -215,7 +217,7 @@ impl Collapse {
     /// # Errors
     /// Parameters or settings out of range, or ground that does not span the grid.
     pub fn over_ground(
-        case: &CollapseCase,
+        case: &CollapseCase<L>,
         options: &SurfaceOptions,
         ground: &CollapseGround,
         walls: Option<SideWalls>,
@@ -243,9 +245,29 @@ impl Collapse {
         x.iter().map(height).collect()
     }
 
-    fn of_flow(case: &CollapseCase, options: &SurfaceOptions, flow: SurfaceFlow<MuI>) -> Self {
+    /// The ground under each column of cells, down to the lower edge of the grid, as the corners (m) of a
+    /// quadrilateral; none on a level floor.
+    pub fn ground_outline(&self) -> Vec<[[f64; 2]; 4]> {
+        let Some(ground) = &self.ground else {
+            return Vec::new();
+        };
+        let axis = &self.flow.grid().axes()[0];
+        let spacing = axis.spacing() * self.case.height;
+        let top = |x: f64| {
+            let height = ground.profile.height_at(x).unwrap_or(self.bottom);
+            [x, height.max(self.bottom)]
+        };
+        (0..axis.cells())
+            .map(|i| {
+                let [x0, x1] = [i as f64, (i + 1) as f64].map(|i| i * spacing);
+                [[x0, self.bottom], [x1, self.bottom], top(x1), top(x0)]
+            })
+            .collect()
+    }
+
+    fn of_flow(case: &CollapseCase<L>, options: &SurfaceOptions, flow: SurfaceFlow<L>) -> Self {
         Self {
-            case: *case,
+            case: case.clone(),
             units: case.units(),
             rest_speed: REST_SPEED * options.solver.strain_rate_floor,
             start_volume: flow.volume(),
@@ -261,22 +283,22 @@ impl Collapse {
     }
 
     /// The material, in SI units.
-    pub fn rheology(&self) -> &MuI {
+    pub fn rheology(&self) -> &L {
         &self.case.rheology
     }
 
     /// The flow, in natural units.
-    pub fn flow(&self) -> &SurfaceFlow<MuI> {
+    pub fn flow(&self) -> &SurfaceFlow<L> {
         &self.flow
     }
 
     /// The flow, in natural units, to be acted on from outside.
-    pub fn flow_mut(&mut self) -> &mut SurfaceFlow<MuI> {
+    pub fn flow_mut(&mut self) -> &mut SurfaceFlow<L> {
         &mut self.flow
     }
 
     /// The flow by itself, in natural units.
-    pub fn into_flow(self) -> SurfaceFlow<MuI> {
+    pub fn into_flow(self) -> SurfaceFlow<L> {
         self.flow
     }
 

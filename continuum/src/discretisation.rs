@@ -106,7 +106,6 @@ impl<const C: usize, const V: usize> QuadraturePoint<C, V> {
     }
 
     /// ∂γ_c/∂u for each of [`velocities`](Self::velocities).
-    #[cfg(feature = "conic")]
     pub(crate) fn rates(&self, component: usize) -> &[f64] {
         &self.rates[component][..self.velocity_count]
     }

@@ -15,6 +15,7 @@
 //! the step without a floor, as a conic program: the reference for both on small grids.
 
 mod coefficients;
+mod conflict;
 #[cfg(feature = "conic")]
 mod conic;
 mod primal_dual;
@@ -95,6 +96,9 @@ pub struct StepReport {
     pub iterations: usize,
     /// Linear systems factorised and solved.
     pub linear_solves: usize,
+    /// Quadrature points whose threshold kept the pressure that the step began with, because with that of
+    /// its end there is no solution.
+    pub held_points: usize,
     /// Residuals at the end.
     pub residuals: Residuals,
     /// Whether all residuals are within tolerance.

@@ -112,9 +112,9 @@ impl Oracle {
             let row = |k: usize| (0..3).map(|l| c[k][l] * gradient[l]).sum::<f64>();
             (0..3).map(|k| gradient[k] * row(k)).sum::<f64>()
         });
-        let outside = self.window.map_or(0.0, |[low, high]| {
-            (mu - law.mu(i.clamp(low, high))).abs()
-        });
+        let outside = self
+            .window
+            .map_or(0.0, |[low, high]| (mu - law.mu(i.clamp(low, high))).abs());
         let layer = NON_LOCAL * law.diameter / look.thickness;
         let wall = look.above_floor.map_or(0.0, |z| {
             let near = 1.0 - z.max(0.0) / (WALL_REACH * law.diameter);
@@ -126,7 +126,13 @@ impl Oracle {
             layer * layer,
             wall,
         ]
-        .map(|e| if e.is_finite() { e.min(UNKNOWN) } else { UNKNOWN })
+        .map(|e| {
+            if e.is_finite() {
+                e.min(UNKNOWN)
+            } else {
+                UNKNOWN
+            }
+        })
     }
 
     /// The largest δμ/μ and its concern.
@@ -157,11 +163,7 @@ mod tests {
                 cohesion: 0.0,
             },
             window: Some([0.2, 0.85]),
-            covariance: Some([
-                [4e-4, 0.0, 0.0],
-                [0.0, 1.6e-3, 0.0],
-                [0.0, 0.0, 0.04],
-            ]),
+            covariance: Some([[4e-4, 0.0, 0.0], [0.0, 1.6e-3, 0.0], [0.0, 0.0, 0.04]]),
         }
     }
 

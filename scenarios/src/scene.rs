@@ -19,6 +19,7 @@ mod collapse_zones;
 mod comet;
 mod error;
 mod friction_keys;
+mod friction_law;
 mod grains;
 mod impact;
 mod incline;
@@ -49,6 +50,7 @@ pub use collapse_terrain::{ContactKind, TerrainKeys};
 pub use collapse_zones::{ColumnOverlapKeys, ColumnZoneKeys, DENSE};
 pub use comet::{CometBlockKeys, CometKeys, MixKind, Softness};
 pub use error::SceneError;
+pub use friction_law::LawVisitor;
 pub use grains::GrainsScene;
 pub use impact::{ImpactScene, RollingKeys};
 pub use incline::{

@@ -201,6 +201,22 @@ fn interrupted_collapse_goes_on_to_the_same_state() {
     });
 }
 
+/// The same over ground that cuts the cells.
+#[test]
+fn interrupted_collapse_on_terrain_goes_on_to_the_same_state() {
+    goes_on_to_the_same_state("run column-collapse", |out| {
+        let mut list = vec!["run", "column-collapse", "--out", out];
+        for set in [
+            "scale=0.5",
+            "aspect=0.7",
+            "terrain={profile=[[0.0,1.0],[2.0,1.0],[2.2,0.3],[6.0,0.0]]}",
+        ] {
+            list.extend(["--set", set]);
+        }
+        list
+    });
+}
+
 /// `begun` is what the log says when there is a run to stop.
 fn goes_on_to_the_same_state(begun: &str, arguments: impl Fn(&'static str) -> Vec<&'static str>) {
     let folder = tempfile::tempdir().unwrap();
@@ -232,6 +248,53 @@ fn goes_on_to_the_same_state(begun: &str, arguments: impl Fn(&'static str) -> Ve
     let text = |out: &str| std::fs::read_to_string(folder.path().join(out)).unwrap();
     assert_eq!(text("whole/front.csv"), text("parts/front.csv"));
     assert_eq!(text("whole/profiles.csv"), text("parts/profiles.csv"));
+}
+
+/// Any law of friction collapses: the well-posed form of μ(I) runs out less far than μ(I), because it bears
+/// more at large I; a table of one friction runs as far as Coulomb's law with it.
+#[test]
+fn columns_of_any_law() {
+    let folder = tempfile::tempdir().unwrap();
+    let runout = |out: &str, sets: &[&str]| {
+        let mut list = vec!["run", "column-collapse", "--out", out];
+        for set in ["scale=0.375", "aspect=1.42", "duration_scaled=8"] {
+            list.extend(["--set", set]);
+        }
+        for set in sets {
+            list.extend(["--set", set]);
+        }
+        succeed(folder.path(), &list);
+        value(&summary(&folder.path().join(out)), "runout_scaled")
+    };
+    let mu_i = runout("mu-i", &[]);
+    let regularised = runout(
+        "barker-gray",
+        &[
+            "rheology.law=\"barker-gray\"",
+            "rheology.alpha=1.9",
+            "rheology.mu_infinity=0.05",
+        ],
+    );
+    let coulomb = runout(
+        "coulomb",
+        &[
+            "rheology.law=\"coulomb\"",
+            "rheology.mu_s=0.4",
+            "rheology.viscosity=0",
+        ],
+    );
+    let flat = runout(
+        "table",
+        &[
+            "rheology.law=\"table\"",
+            "rheology.table=[[0.01,0.4],[1.0,0.4]]",
+        ],
+    );
+    assert!(
+        regularised < mu_i && regularised > 0.7 * mu_i,
+        "{mu_i} {regularised}"
+    );
+    assert!((flat / coulomb - 1.0).abs() < 1e-3, "{flat} {coulomb}");
 }
 
 /// Side walls hold the material back.
@@ -269,6 +332,12 @@ fn bad_collapses_are_refused_by_key() {
         ("solver.courant=1.5", "solver.courant", "1"),
         ("rheology.mu_2=0.1", "rheology.mu_2", "0.32"),
         ("aspect=0", "aspect", "0.05"),
+        (
+            "rheology.law=\"barker-gray\"",
+            "rheology.alpha",
+            "barker-gray",
+        ),
+        ("rheology.alpha=1.9", "rheology.alpha", "mu-i"),
         ("grains.floor=\"sand\"", "grains.floor", "smooth"),
         (
             "contact.youngs_modulus=1e6",
@@ -312,8 +381,7 @@ fn bad_collapses_are_refused_by_key() {
     }
 }
 
-/// A column on a plateau runs over its edge: the same bits with one thread and two and after a stop, and
-/// by points, a raster and a mesh of the same ground.
+/// A column on a plateau runs over its edge: the same bits with one thread and two, and by points, a raster and a mesh of the same ground.
 #[test]
 fn collapse_on_terrain() {
     let folder = tempfile::tempdir().unwrap();
@@ -368,6 +436,28 @@ fn collapse_on_terrain() {
     let (header, deposit) = table(&out.join("deposit.csv"));
     assert_eq!(header, ["x", "h", "z_ground"]);
     assert!((deposit[0][2] - 1.0).abs() < 1e-12 && deposit[39][2].abs() < 0.1);
+    // The fields show the ground: all that lies under the profile, down to the lower edge of the grid.
+    let frames = vtkhdf::read_series(&out.join("fields.vtkhdf")).unwrap();
+    let last = frames.last().unwrap();
+    let is_ground = last.fields.iter().find(|f| f.name == "ground").unwrap();
+    let vtkhdf::Values::Counts(is_ground) = &is_ground.values else {
+        panic!("flags");
+    };
+    let ground: f64 = is_ground
+        .iter()
+        .zip(last.points.chunks_exact(4))
+        .filter(|(ground, _)| **ground == 1)
+        .map(|(_, q)| (q[1][0] - q[0][0]) * (0.5 * (q[2][2] + q[3][2]) - q[0][2]))
+        .sum();
+    // The trapezoids of the profile, and a row of cells below it.
+    let under: f64 = heights
+        .windows(2)
+        .map(|z| 0.5 * (z[0] + z[1]) * spacing)
+        .sum();
+    assert!(
+        (ground - under - 0.1 * 4.0).abs() < 1e-9,
+        "{ground} {under}"
+    );
     let report = std::fs::read_to_string(out.join("report.html")).unwrap();
     assert!(report.contains("ground") && report.contains("height z [m]"));
     let planned = colluvium(

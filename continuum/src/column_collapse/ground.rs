@@ -3,7 +3,7 @@
 use super::{CollapseCase, ROOM_ABOVE};
 use crate::error::{Error, require};
 use crate::free_surface::{Contact, SurfaceFlow, SurfaceOptions, Terrain};
-use crate::rheology::{MuI, Rheology};
+use crate::rheology::ShearLaw;
 use crate::terrain::Profile;
 
 /// Ground on which a column stands and runs out, instead of a level floor; SI units.
@@ -34,13 +34,14 @@ impl CollapseGround {
 
 /// Most cells of a grid over ground.
 const MOST_CELLS: f64 = 4e6;
-impl CollapseCase {
+
+impl<L: ShearLaw + Clone> CollapseCase<L> {
     /// The column at rest on ground, in natural units, and the height of the grid's lower edge (m).
     pub(super) fn flow_over(
         &self,
         ground: &CollapseGround,
         options: &SurfaceOptions,
-    ) -> Result<(SurfaceFlow<MuI>, f64), Error> {
+    ) -> Result<(SurfaceFlow<L>, f64), Error> {
         let spacing = self.length_scaled / self.cells as f64;
         let length = self.length_scaled * self.height;
         let foot = ground.profile.height_at(0.0).unwrap_or(f64::NAN);

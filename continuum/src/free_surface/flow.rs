@@ -48,7 +48,7 @@ impl Default for SurfaceOptions {
     fn default() -> Self {
         Self {
             courant: 0.45,
-            largest_step: 0.05,
+            largest_step: 0.1,
             growth: 1.3,
             thin_layer: ThinLayer::default(),
             solver: PrimalDualOptions {
@@ -104,6 +104,8 @@ pub struct SurfaceStep {
     pub newton_iterations: usize,
     /// Steps that were cut and tried again.
     pub cuts: usize,
+    /// Points whose friction went by the pressure before the step ([`crate::yield_step::StepReport::held_points`]).
+    pub held_points: usize,
     /// Residuals of the equations.
     pub residuals: Residuals,
     /// Largest speed of material.
@@ -762,6 +764,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         self.spent.newton += clock.elapsed().as_secs_f64();
         record.newton_iterations += report.iterations;
         record.residuals = report.residuals;
+        record.held_points = report.held_points;
         if report.converged {
             if let Some(outside) = &self.outside {
                 let rates = outside.untaken(&faces, &self.topology);

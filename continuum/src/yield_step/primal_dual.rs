@@ -5,13 +5,21 @@
 //! fast down to very small ε where the law solved for s alone makes it stall. The pressure in the
 //! threshold is an unknown of the same Newton step: taking it from the previous step or iterating
 //! on it outside costs accuracy or time. ε starts at 0.3 √(g/H) and falls tenfold per iteration.
+//!
+//! Friction that grows with the pressure can leave p ≥ 0 ⟂ ∇·u ≥ 0 without a solution, as in Painlevé's
+//! paradox of the sliding rod: where a film is much thinner than a cell, a pressure brakes what leaves the
+//! cell by more than it pushes it, so the cell contracts more the more it is pressed. Newton's method then
+//! lets the cell go and seizes it in turn. Such cells are found by that, and the thresholds which depend on
+//! their pressure keep the pressure that the step began with: friction is then given, and the step has a
+//! solution. [`StepReport::held_points`] counts them.
 
 use serde::{Deserialize, Serialize};
 
 use super::coefficients::StepMatrix;
+use super::conflict::Conflicts;
 use super::{
     FlowState, Residuals, StepProblem, StepReport, YieldSolver, divergence_residual,
-    largest_or_nan, momentum_residual, threshold_pressure,
+    largest_or_nan, momentum_residual,
 };
 use crate::discretisation::{COMPONENTS, Discretisation, QuadraturePoint};
 use crate::error::Error;
@@ -68,9 +76,11 @@ impl Default for PrimalDualOptions {
 
 /// Smallest ε with which the stress law can be met in double precision.
 const SMALLEST_STRAIN_RATE_FLOOR: f64 = 1e-7;
+/// Most times that thresholds next to cells in conflict are held and the step is tried again.
+const MOST_HELD_ROUNDS: usize = 4;
 /// Iterations after which a start from the previous stress at the final ε is given up in favour of
 /// a cold start.
-const WARM_ITERATIONS: usize = 12;
+const WARM_ITERATIONS: usize = 20;
 
 /// Relative residual to which the linear system of a Newton iteration is solved when it is solved
 /// iteratively: a tighter one saves no iteration.
@@ -113,6 +123,9 @@ pub struct PrimalDual<const C: usize = COMPONENTS> {
     points: Vec<LinearisedPoint<C>>,
     /// Cells without pressure that may dilate.
     released: Vec<bool>,
+    /// Cells whose pressure came out negative and was cut at zero.
+    cut: Vec<bool>,
+    conflicts: Conflicts,
     right_hand_side: Vec<f64>,
     change: Vec<f64>,
     candidate: Vec<f64>,
@@ -158,6 +171,8 @@ impl<const C: usize> PrimalDual<C> {
             trial: FlowState::at_rest(discretisation, vec![0.0; cells]),
             points: vec![LinearisedPoint::default(); discretisation.points().len()],
             released: vec![false; cells],
+            cut: vec![false; cells],
+            conflicts: Conflicts::new(cells, discretisation.points().len()),
             right_hand_side: vec![0.0; velocities + cells],
             change: vec![0.0; velocities + cells],
             candidate: vec![0.0; velocities],
@@ -174,6 +189,8 @@ impl<const C: usize> PrimalDual<C> {
         report: &mut StepReport,
     ) {
         self.trial.clone_from(start);
+        self.conflicts.begin();
+        self.cut.fill(false);
         let mut floor = strategy.first_floor;
         for iteration in 0..strategy.max_iterations {
             self.release(problem.discretisation, iteration == 0);
@@ -202,6 +219,9 @@ impl<const C: usize> PrimalDual<C> {
                 report.converged = true;
                 return;
             }
+            if self.conflicts.is_cycling() {
+                return;
+            }
             if fraction >= 0.5 {
                 floor = (floor * strategy.factor).max(self.options.strain_rate_floor);
             }
@@ -215,9 +235,13 @@ impl<const C: usize> PrimalDual<C> {
         floor: f64,
     ) {
         let points = problem.discretisation.points();
-        for ((point, linear), s) in points.iter().zip(&mut self.points).zip(&self.trial.s) {
+        let trial = &self.trial;
+        let linear = self.points.iter_mut().zip(&trial.s);
+        for (q, (point, (linear, s))) in points.iter().zip(linear).enumerate() {
+            let pressure = self.conflicts.pressure(q, point, &trial.p);
+            self.conflicts.note_point(q, pressure.1);
             let (gamma, rate, threshold) =
-                evaluate(problem.rheology, point, &self.trial.u, &self.trial.p, floor);
+                evaluate(problem.rheology, point, &trial.u, pressure, floor);
             let viscosity = threshold.stress / rate;
             let inverse_square = 1.0 / (rate * rate);
             for a in 0..C {
@@ -282,7 +306,8 @@ impl<const C: usize> PrimalDual<C> {
     /// volume (p ≥ 0 and ∇·u ≥ 0 complement each other). Fills the continuity part of the
     /// right-hand side.
     /// The first iteration goes by the pressure alone, because the velocity that a step begins with
-    /// has a divergence of its own.
+    /// has a divergence of its own. A pressure that has come out negative decides by itself, too: the
+    /// divergence beside it is zero but for what the linear solution misses by.
     fn release<const D: usize, const V: usize>(
         &mut self,
         discretisation: &Discretisation<D, C, V>,
@@ -292,13 +317,15 @@ impl<const C: usize> PrimalDual<C> {
         divergence_residual(discretisation, &self.trial.u, continuity);
         if self.options.one_sided_pressure {
             let volume = discretisation.grid().cell_volume();
-            for ((released, p), d) in self.released.iter_mut().zip(&self.trial.p).zip(continuity) {
+            let cells = self.trial.p.iter().zip(continuity).zip(&self.cut);
+            for (released, ((p, d), cut)) in self.released.iter_mut().zip(cells) {
                 *released = if is_first {
                     *p <= 0.0
                 } else {
-                    p - *d / volume <= 0.0
+                    *cut || p - *d / volume <= 0.0
                 };
             }
+            self.conflicts.note_cells(&self.released);
         }
     }
 
@@ -315,13 +342,14 @@ impl<const C: usize> PrimalDual<C> {
         for ((c, p), d) in pressure.iter_mut().zip(&self.trial.p).zip(dp) {
             *c = p + d;
         }
-        let start = functional(problem, u_old, &self.trial.u, pressure, floor);
+        let held = &self.conflicts;
+        let start = functional(problem, u_old, &self.trial.u, pressure, held, floor);
         let mut fraction = 1.0;
         while fraction > 0.125 {
             for ((c, u), d) in self.candidate.iter_mut().zip(&self.trial.u).zip(du) {
                 *c = u + fraction * d;
             }
-            let value = functional(problem, u_old, &self.candidate, pressure, floor);
+            let value = functional(problem, u_old, &self.candidate, pressure, held, floor);
             if value <= start + 1e-12 * start.abs() {
                 break;
             }
@@ -356,13 +384,18 @@ impl<const C: usize> PrimalDual<C> {
         }
         for (p, d) in self.trial.p.iter_mut().zip(dp) {
             *p += d;
-            if self.options.one_sided_pressure {
+        }
+        if self.options.one_sided_pressure {
+            let cells = self.trial.p.iter_mut().zip(&mut self.cut);
+            for ((p, cut), released) in cells.zip(&self.released) {
+                *cut = *p < 0.0 && !released;
                 *p = p.max(0.0);
             }
         }
-        for (point, s) in points.iter().zip(&mut self.trial.s) {
+        for (q, (point, s)) in points.iter().zip(&mut self.trial.s).enumerate() {
+            let pressure = self.conflicts.pressure(q, point, &self.trial.p);
             let (_, _, threshold) =
-                evaluate(problem.rheology, point, &self.trial.u, &self.trial.p, floor);
+                evaluate(problem.rheology, point, &self.trial.u, pressure, floor);
             let size = strain_rate_norm(*s);
             if size > threshold.stress {
                 let shrink = threshold.stress / size;
@@ -381,9 +414,11 @@ impl<const C: usize> PrimalDual<C> {
         let divergence = self.continuity_residual(problem.discretisation);
         let momentum = &mut self.right_hand_side[..self.trial.u.len()];
         let mut stress = 0.0;
-        for (point, s) in problem.discretisation.points().iter().zip(&self.trial.s) {
+        let points = problem.discretisation.points().iter().zip(&self.trial.s);
+        for (q, (point, s)) in points.enumerate() {
+            let pressure = self.conflicts.pressure(q, point, &self.trial.p);
             let (gamma, rate, threshold) =
-                evaluate(problem.rheology, point, &self.trial.u, &self.trial.p, floor);
+                evaluate(problem.rheology, point, &self.trial.u, pressure, floor);
             let miss: [f64; C] = std::array::from_fn(|a| s[a] * rate - threshold.stress * gamma[a]);
             let scale = rate * (threshold.stress + 1e-3);
             stress = largest_or_nan(stress, strain_rate_norm(miss) / scale);
@@ -439,18 +474,18 @@ impl<const C: usize> PrimalDual<C> {
     }
 }
 
-/// γ, γ_ε = √(|γ|² + ε²) and the threshold at a point.
+/// γ, γ_ε = √(|γ|² + ε²) and the threshold at a point under a pressure, of which is said whether it
+/// depends on the cells'.
 #[inline]
 fn evaluate<R: Rheology, const C: usize, const V: usize>(
     rheology: &R,
     point: &QuadraturePoint<C, V>,
     u: &[f64],
-    p: &[f64],
+    (pressure, depends): (f64, bool),
     floor: f64,
 ) -> ([f64; C], f64, crate::rheology::Threshold) {
     let gamma = point.strain_rate(u);
     let rate = (squared_norm(&gamma) + floor * floor).sqrt();
-    let (pressure, depends) = threshold_pressure(point.pressure(p));
     let mut threshold = point.law.threshold(rheology, rate, pressure);
     if !depends {
         threshold.by_pressure = 0.0;
@@ -465,6 +500,7 @@ fn functional<R: Rheology, const D: usize, const C: usize, const V: usize>(
     u_old: &[f64],
     u: &[f64],
     p: &[f64],
+    conflicts: &Conflicts,
     floor: f64,
 ) -> f64 {
     let mass = problem.discretisation.mass();
@@ -478,10 +514,11 @@ fn functional<R: Rheology, const D: usize, const C: usize, const V: usize>(
         .discretisation
         .points()
         .iter()
-        .map(|point| {
+        .enumerate()
+        .map(|(q, point)| {
             let gamma = point.strain_rate(u);
             let rate = (squared_norm(&gamma) + floor * floor).sqrt();
-            let (pressure, _) = threshold_pressure(point.pressure(p));
+            let (pressure, _) = conflicts.pressure(q, point, p);
             point.weight * point.law.potential(problem.rheology, rate, pressure)
         })
         .sum();
@@ -523,10 +560,18 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> YieldSolver<R,
         let is_cold = state.s.iter().all(|s| *s == [0.0; C])
             && problem.rheology.threshold(1.0, 1.0).stress > 0.0;
         let mut report = StepReport::default();
-        for strategy in &strategies[usize::from(is_cold)..] {
-            self.attempt(problem, state, strategy, &mut report);
-            if report.converged {
-                state.clone_from(&self.trial);
+        self.conflicts.forget();
+        for round in 0..=MOST_HELD_ROUNDS {
+            for strategy in &strategies[usize::from(is_cold)..] {
+                self.attempt(problem, state, strategy, &mut report);
+                if report.converged {
+                    state.clone_from(&self.trial);
+                    report.held_points = self.conflicts.held();
+                    return Ok(report);
+                }
+            }
+            let points = problem.discretisation.points();
+            if round == MOST_HELD_ROUNDS || !self.conflicts.hold(points, &state.p) {
                 break;
             }
         }

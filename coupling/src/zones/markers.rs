@@ -123,7 +123,10 @@ impl<'a> Sight<'a> {
         let mut cells = vec![None; columns * rows];
         let mut thickness = vec![0.0; columns];
         // Material below or left of where there was any at the start has no place here: its floor and wall are there.
-        for f in fields.iter().filter(|f| index(f, 0) >= 0.0 && index(f, 1) >= 0.0) {
+        for f in fields
+            .iter()
+            .filter(|f| index(f, 0) >= 0.0 && index(f, 1) >= 0.0)
+        {
             let (i, k) = (index(f, 0) as usize, index(f, 1) as usize);
             cells[k * columns + i] = Some(f);
             if f.flows {
@@ -223,7 +226,9 @@ mod tests {
                 well_posed: true,
             }
         };
-        (0..20).flat_map(|k| (0..20).map(move |i| cell((i, k)))).collect()
+        (0..20)
+            .flat_map(|k| (0..20).map(move |i| cell((i, k))))
+            .collect()
     }
 
     #[test]

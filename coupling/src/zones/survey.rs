@@ -42,7 +42,11 @@ impl Survey {
         while let Some(first) = rows.first() {
             let column = rows.partition_point(|r| r[0] <= first[0]);
             let (here, after) = rows.split_at(column);
-            needy += here.iter().filter(|r| r[2] > tolerance).map(|r| r[1]).sum::<f64>();
+            needy += here
+                .iter()
+                .filter(|r| r[2] > tolerance)
+                .map(|r| r[1])
+                .sum::<f64>();
             if needy > allowed {
                 return edge;
             }

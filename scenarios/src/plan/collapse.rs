@@ -9,7 +9,8 @@ use colluvium_continuum::free_surface::Contact;
 /// The plan, with the ground that the scene describes if it has any.
 pub(super) fn collapse(body: &CollapseScene, ground: Option<&CollapseGround>) -> String {
     let mut lines = Lines::default();
-    let case = run::collapse::case(body);
+    // Of the law only the density counts here.
+    let case = run::collapse::case(body, body.rheology.mu_i());
     let units = case.units();
     let spacing = body.grid.length_scaled * body.height / case.cells as f64;
     let column = body.section(body.height) / (spacing * spacing);

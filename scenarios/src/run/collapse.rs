@@ -8,7 +8,7 @@ use crate::cost::Cost;
 use crate::failure::Failure;
 use crate::frames;
 use crate::progress::Bar;
-use crate::scene::{CollapseModel, CollapseScene, Scene, ThinLayerKind};
+use crate::scene::{CollapseModel, CollapseScene, LawVisitor, Scene, ThinLayerKind};
 use crate::state_hash;
 use crate::summary::{Model, Quantity, Summary};
 use crate::table::Table;
@@ -17,7 +17,7 @@ use colluvium_continuum::column_collapse::{Collapse, CollapseCase, Front};
 use colluvium_continuum::free_surface::{
     CellFields, SurfaceOptions, SurfaceState, SurfaceStep, ThinLayer,
 };
-use colluvium_continuum::rheology::strain_rate_norm;
+use colluvium_continuum::rheology::{ShearLaw, strain_rate_norm};
 use colluvium_continuum::wall_friction::{SideWalls, WallFriction};
 use colluvium_dem::Record;
 
@@ -36,13 +36,13 @@ const PROFILES: f64 = 24.0;
 /// Steps at rest after which a run ends.
 const REST_STEPS: u64 = 3;
 
-/// The case that a scene describes.
-pub fn case(scene: &CollapseScene) -> CollapseCase {
+/// The case that a scene describes, of a material with this law.
+pub fn case<L>(scene: &CollapseScene, rheology: L) -> CollapseCase<L> {
     CollapseCase {
         aspect: scene.aspect,
         height: scene.height,
         gravity: scene.gravity,
-        rheology: scene.rheology.mu_i(),
+        rheology,
         cells: scene.cells(),
         length_scaled: scene.grid.length_scaled,
         overhang_degrees: scene.overhang_degrees,
@@ -85,22 +85,46 @@ pub(super) fn check(scene: &Scene, body: &CollapseScene) -> Result<(), Failure> 
     }
     let named =
         |error: colluvium_continuum::Error| Failure::Input(format!("{}: {error}", scene.origin));
-    case(body).validate().map_err(named)?;
     options(body).validate().map_err(named)?;
-    // Ground shows whether it fits when the grid is cut.
-    if body.terrain.is_some() {
-        begun(body, &scene.origin)?;
+    let check = Check {
+        scene: body,
+        origin: &scene.origin,
+    };
+    body.rheology.visit_law(check).map_err(named)?
+}
+
+/// Checks the case with its law.
+struct Check<'a> {
+    scene: &'a CollapseScene,
+    origin: &'a str,
+}
+
+impl LawVisitor for Check<'_> {
+    type Output = Result<(), Failure>;
+
+    fn visit<L: ShearLaw + Clone>(self, law: L) -> Self::Output {
+        let case = case(self.scene, law);
+        case.validate()
+            .map_err(|error| Failure::Input(format!("{}: {error}", self.origin)))?;
+        // Ground shows whether it fits when the grid is cut.
+        if self.scene.terrain.is_some() {
+            begun(&case, self.scene, self.origin)?;
+        }
+        Ok(())
     }
-    Ok(())
 }
 
 /// The column before it is let go.
-fn begun(scene: &CollapseScene, origin: &str) -> Result<Collapse, Failure> {
-    let (case, options, walls) = (case(scene), options(scene), walls(scene));
+fn begun<L: ShearLaw + Clone>(
+    case: &CollapseCase<L>,
+    scene: &CollapseScene,
+    origin: &str,
+) -> Result<Collapse<L>, Failure> {
+    let (options, walls) = (options(scene), walls(scene));
     match (collapse_ground::ground(scene, origin)?, walls) {
-        (Some(ground), walls) => Collapse::over_ground(&case, &options, &ground, walls),
-        (None, None) => Collapse::new(&case, &options),
-        (None, Some(walls)) => Collapse::between_side_walls(&case, &options, walls),
+        (Some(ground), walls) => Collapse::over_ground(case, &options, &ground, walls),
+        (None, None) => Collapse::new(case, &options),
+        (None, Some(walls)) => Collapse::between_side_walls(case, &options, walls),
     }
     .map_err(|error| Failure::Input(format!("{origin}: {error}")))
 }
@@ -142,7 +166,7 @@ impl Course {
     }
 
     /// Takes the front down, once an instant: a run may end at one that was just seen.
-    fn see_front(&mut self, collapse: &Collapse, threshold: f64) {
+    fn see_front<L: ShearLaw + Clone>(&mut self, collapse: &Collapse<L>, threshold: f64) {
         let front = collapse.front(threshold);
         if self.fronts.last().is_none_or(|last| last.time < front.time) {
             self.fronts.push(front);
@@ -153,7 +177,7 @@ impl Course {
         }
     }
 
-    fn see_profile(&mut self, collapse: &Collapse) {
+    fn see_profile<L: ShearLaw + Clone>(&mut self, collapse: &Collapse<L>) {
         let (x, h) = collapse.profile();
         let [times, positions, heights] = &mut self.profiles;
         times.extend(std::iter::repeat_n(collapse.time(), x.len()));
@@ -258,7 +282,32 @@ pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, 
     if scene.model == CollapseModel::Hybrid {
         return joined_column::run(scene, under);
     }
-    let mut collapse = begun(scene, &under.scene.origin)?;
+    let origin = under.scene.origin.clone();
+    let law = &scene.rheology;
+    law.visit_law(Run { scene, under })
+        .map_err(|error| Failure::Input(format!("{origin}: {error}")))?
+}
+
+/// Computes the collapse of a material with its law.
+struct Run<'a, 'b, 'c> {
+    scene: &'a CollapseScene,
+    under: &'b mut Under<'c>,
+}
+
+impl LawVisitor for Run<'_, '_, '_> {
+    type Output = Result<Findings, Failure>;
+
+    fn visit<L: ShearLaw + Clone>(self, law: L) -> Self::Output {
+        continuum(&case(self.scene, law), self.scene, self.under)
+    }
+}
+
+fn continuum<L: ShearLaw + Clone>(
+    case: &CollapseCase<L>,
+    scene: &CollapseScene,
+    under: &mut Under,
+) -> Result<Findings, Failure> {
+    let mut collapse = begun(case, scene, &under.scene.origin)?;
     let unit = collapse.units().time();
     let end = scene.duration_scaled * unit;
     let threshold = scene.front_height_scaled * scene.height;
@@ -286,7 +335,7 @@ pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, 
     let fresh = under.resumed.is_none();
     under.begin()?;
     if fresh {
-        picture(under, &collapse, 0)?;
+        picture(under, scene, &collapse, 0)?;
     }
     let bar = Bar::new(&under.scene.name);
     while collapse.time() < end * (1.0 - 1e-9) && course.counts[4] < REST_STEPS {
@@ -300,7 +349,7 @@ pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, 
             course.see_front(&collapse, threshold);
             if (next * PROFILES / FRONTS).fract() < 1e-6 {
                 course.see_profile(&collapse);
-                picture(under, &collapse, next as u64)?;
+                picture(under, scene, &collapse, next as u64)?;
             }
         }
         bar.set(collapse.time() / end);
@@ -316,6 +365,7 @@ pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, 
     course.see_front(&collapse, threshold);
     join_pictures(
         under,
+        scene,
         &collapse,
         (collapse.time() / end * FRONTS + 1e-6) as u64,
     )?;
@@ -329,32 +379,47 @@ pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, 
 }
 
 /// Writes the fields at an instant of the front.
-fn picture(under: &Under, collapse: &Collapse, instant: u64) -> Result<(), Failure> {
-    let frame = fields(collapse);
+fn picture<L: ShearLaw + Clone>(
+    under: &Under,
+    scene: &CollapseScene,
+    collapse: &Collapse<L>,
+    instant: u64,
+) -> Result<(), Failure> {
+    let frame = fields(scene, collapse);
     frames::put(under.directory.path(), frames::FIELDS, instant, frame)
 }
 
 /// Joins the fields at all instants of the profile up to the last one of the front, and those of the end.
-fn join_pictures(under: &Under, collapse: &Collapse, last: u64) -> Result<(), Failure> {
+fn join_pictures<L: ShearLaw + Clone>(
+    under: &Under,
+    scene: &CollapseScene,
+    collapse: &Collapse<L>,
+    last: u64,
+) -> Result<(), Failure> {
     let every = (FRONTS / PROFILES) as u64;
     let mut numbers: Vec<u64> = (0..=last).step_by(every as usize).collect();
     if !last.is_multiple_of(every) {
-        picture(under, collapse, last)?;
+        picture(under, scene, collapse, last)?;
         numbers.push(last);
     }
     frames::join(under.directory.path(), frames::FIELDS, &numbers)
 }
 
-/// Cells with material as quadrilaterals in the plane y = 0.
-fn fields(collapse: &Collapse) -> Frame {
+/// Cells with material as quadrilaterals in the plane y = 0, then the ground under each column of cells
+/// if there is any.
+fn fields<L: ShearLaw + Clone>(scene: &CollapseScene, collapse: &Collapse<L>) -> Frame {
     let cells = collapse.fields();
-    let law = collapse.rheology();
-    let corners = cells.iter().flat_map(|c| {
+    let grains = &scene.rheology;
+    // I = γ̇ d √(ρ_s/p), whatever the law.
+    let scale = grains.diameter * grains.grain_density.sqrt();
+    let outline = collapse.ground_outline();
+    let corners = cells.iter().map(|c| {
         let ([x0, z0], [x1, z1]) = (c.lower, c.upper);
-        [[x0, 0.0, z0], [x1, 0.0, z0], [x1, 0.0, z1], [x0, 0.0, z1]]
+        [[x0, z0], [x1, z0], [x1, z1], [x0, z1]]
     });
+    let corners = corners.chain(outline.iter().copied()).flatten();
     let inertial = |c: &CellFields| match c.pressure {
-        p if p > 0.0 => law.inertial_number(c.strain_rate, p),
+        p if p > 0.0 => c.strain_rate * scale / p.sqrt(),
         _ => 0.0,
     };
     let friction = |c: &CellFields| match c.pressure {
@@ -367,17 +432,21 @@ fn fields(collapse: &Collapse) -> Frame {
         values,
     };
     let scalars = |name: &str, unit: &str, of: &dyn Fn(&CellFields) -> f64| {
-        field(name, unit, Values::Scalars(cells.iter().map(of).collect()))
+        let nothing = std::iter::repeat_n(0.0, outline.len());
+        let values = cells.iter().map(of).chain(nothing);
+        field(name, unit, Values::Scalars(values.collect()))
     };
     let flags = |name: &str, of: &dyn Fn(&CellFields) -> bool| {
-        let values = cells.iter().map(|c| i64::from(of(c)));
+        let nothing = std::iter::repeat_n(0, outline.len());
+        let values = cells.iter().map(|c| i64::from(of(c))).chain(nothing);
         field(name, "1", Values::Counts(values.collect()))
     };
     let velocity = cells.iter().map(|c| [c.velocity[0], 0.0, c.velocity[1]]);
-    Frame {
+    let velocity = velocity.chain(std::iter::repeat_n([0.0; 3], outline.len()));
+    let mut frame = Frame {
         time: collapse.time(),
         cells: Cells::Quadrilaterals,
-        points: corners.collect(),
+        points: corners.map(|[x, z]| [x, 0.0, z]).collect(),
         fields: vec![
             scalars("fraction", "1", &|c| c.fraction),
             field("velocity", "m/s", Values::Vectors(velocity.collect())),
@@ -390,14 +459,21 @@ fn fields(collapse: &Collapse) -> Frame {
             flags("flows", &|c| c.flows),
             flags("well_posed", &|c| c.well_posed),
         ],
+    };
+    if !outline.is_empty() {
+        let material = std::iter::repeat_n(0, cells.len());
+        let is_ground = material.chain(std::iter::repeat_n(1, outline.len()));
+        let values = Values::Counts(is_ground.collect());
+        frame.fields.push(field("ground", "1", values));
     }
+    frame
 }
 
-fn speed(collapse: &Collapse, step: &SurfaceStep) -> f64 {
+fn speed<L: ShearLaw + Clone>(collapse: &Collapse<L>, step: &SurfaceStep) -> f64 {
     step.max_speed * collapse.units().velocity
 }
 
-fn tables(collapse: &Collapse, course: &Course) -> Vec<Table> {
+fn tables<L: ShearLaw + Clone>(collapse: &Collapse<L>, course: &Course) -> Vec<Table> {
     let (x, h) = collapse.profile();
     let fronts = &course.fronts;
     let [times, positions, heights] = &course.profiles;
@@ -428,14 +504,13 @@ fn tables(collapse: &Collapse, course: &Course) -> Vec<Table> {
     ]
 }
 
-fn describe(
+fn describe<L: ShearLaw + Clone>(
     summary: &mut Summary,
     scene: &CollapseScene,
-    collapse: &Collapse,
+    collapse: &Collapse<L>,
     course: &Course,
     wall_s: f64,
 ) {
-    let case = case(scene);
     let units = collapse.units();
     let state = collapse.flow().state();
     let [steps, iterations, cuts, cell_steps, resting] = course.counts;
@@ -456,7 +531,7 @@ fn describe(
     ]);
     summary.remarks.extend(scene.rheology.remarks());
     let front = course.fronts.last().copied().unwrap_or_default();
-    let width = case.width();
+    let width = scene.height / scene.aspect;
     let mut put = |name: &str, value: f64, unit: &str, source: &str| {
         summary.put(name, Quantity::new(value, unit).from(source));
     };

@@ -2,8 +2,8 @@
 
 use super::world::{OutputKeys, StepKeys};
 use super::{
-    ColumnGrainKeys, ColumnOverlapKeys, ColumnZoneKeys, FrictionLaw, LawKeys, RheologyKeys,
-    SceneError, TerrainKeys,
+    ColumnGrainKeys, ColumnOverlapKeys, ColumnZoneKeys, LawKeys, RheologyKeys, SceneError,
+    TerrainKeys,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -70,7 +70,7 @@ pub struct CollapseScene {
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
 #[serde(rename_all = "kebab-case")]
 pub enum CollapseModel {
-    /// A μ(I) continuum with a free surface.
+    /// A continuum with a free surface.
     Continuum,
     /// Grains.
     Dem,
@@ -184,13 +184,6 @@ impl CollapseScene {
                 "rheology.valid_i",
                 format!("[{low}, {high}]"),
                 "[low, high] with low < high".into(),
-            );
-        }
-        if r.law != FrictionLaw::MuI {
-            return refused(
-                "rheology.law",
-                r.law.word().into(),
-                "mu-i: columns collapse under this law alone".into(),
             );
         }
         if let (Some(mu_s), Some(mu_2)) = (r.mu_s, r.mu_2)

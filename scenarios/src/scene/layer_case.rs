@@ -1,10 +1,10 @@
 //! The continuum's case that a scene describes: where the name of a law becomes a type.
 
-use super::bagnold::{BagnoldScene, FrictionLaw, RheologyKeys};
+use super::bagnold::{BagnoldScene, FrictionLaw};
 use colluvium_continuum::Error;
 use colluvium_continuum::bagnold::{BagnoldCase, BagnoldSolution};
 use colluvium_continuum::layer::{Options, Progress};
-use colluvium_continuum::rheology::{BarkerGray, Coulomb, FrictionTable, Grains, MuI, ShearLaw};
+use colluvium_continuum::rheology::{BarkerGray, Coulomb, FrictionTable, MuI, ShearLaw};
 use std::ops::ControlFlow;
 
 /// A layer with its law.
@@ -48,34 +48,9 @@ impl LayerCase {
         let r = &scene.rheology;
         Ok(match r.law {
             FrictionLaw::MuI => LayerCase::MuI(layer(scene, r.mu_i())),
-            FrictionLaw::Coulomb => LayerCase::Coulomb(layer(
-                scene,
-                Coulomb {
-                    mu: number(r.mu_s),
-                    cohesion: r.cohesion,
-                    viscosity: number(r.viscosity),
-                    density: r.solid_fraction * r.grain_density,
-                },
-            )),
-            FrictionLaw::BarkerGray => LayerCase::BarkerGray(layer(
-                scene,
-                BarkerGray::new(r.mu_i(), number(r.alpha), number(r.mu_infinity))?,
-            )),
-            FrictionLaw::Table => {
-                let points: Vec<[f64; 2]> = r
-                    .table
-                    .iter()
-                    .flatten()
-                    .filter_map(|point| point.as_slice().try_into().ok())
-                    .collect();
-                let grains = Grains {
-                    diameter: r.diameter,
-                    solid_fraction: r.solid_fraction,
-                    grain_density: r.grain_density,
-                    cohesion: r.cohesion,
-                };
-                LayerCase::Table(layer(scene, FrictionTable::new(&points, grains)?))
-            }
+            FrictionLaw::Coulomb => LayerCase::Coulomb(layer(scene, r.coulomb())),
+            FrictionLaw::BarkerGray => LayerCase::BarkerGray(layer(scene, r.barker_gray()?)),
+            FrictionLaw::Table => LayerCase::Table(layer(scene, r.friction_table()?)),
         })
     }
 
@@ -138,26 +113,6 @@ impl LayerCase {
         match self {
             LayerCase::Table(case) => Some(case.rheology.valid_inertial_numbers()),
             _ => None,
-        }
-    }
-}
-
-/// A number that the scene's check has seen to be there, as its law reads it.
-fn number(value: Option<f64>) -> f64 {
-    value.unwrap_or(f64::NAN)
-}
-
-impl RheologyKeys {
-    /// μ(I) with these numbers.
-    pub fn mu_i(&self) -> MuI {
-        MuI {
-            mu_s: number(self.mu_s),
-            mu_2: number(self.mu_2),
-            i_0: number(self.i_0),
-            diameter: self.diameter,
-            solid_fraction: self.solid_fraction,
-            grain_density: self.grain_density,
-            cohesion: self.cohesion,
         }
     }
 }
