@@ -82,6 +82,11 @@ impl QuadraturePoint {
         self.rates[component][slot] += coefficient;
     }
 
+    /// Adds to the strain rate what a given velocity contributes.
+    pub(crate) fn add_known_rate(&mut self, component: usize, rate: f64) {
+        self.offset[component] += rate;
+    }
+
     pub(crate) fn add_pressure(&mut self, cell: usize, weight: f64) {
         let known = &self.pressures[..self.pressure_count];
         let slot = known
@@ -164,6 +169,8 @@ pub struct Discretisation {
     /// For each entry of the divergence, the force of the cell's pressure on the velocity.
     gradient: Vec<f64>,
     boundary_load: Vec<f64>,
+    /// Fluxes out of cells through faces whose velocity is given.
+    known_fluxes: Vec<(usize, f64)>,
     cells: usize,
     /// Places of velocities and then cells, where they are known.
     places: Vec<Place>,
@@ -178,6 +185,7 @@ pub(crate) struct Parts {
     pub divergence: Vec<(usize, usize, f64)>,
     pub gradient: Vec<f64>,
     pub boundary_load: Vec<f64>,
+    pub known_fluxes: Vec<(usize, f64)>,
     pub cells: usize,
     /// Places of velocities and then cells in half cells; may be left out.
     pub places: Vec<Place>,
@@ -233,6 +241,7 @@ impl Discretisation {
             gradient: divergence.iter().map(|&(_, _, area)| area).collect(),
             divergence,
             boundary_load,
+            known_fluxes: Vec::new(),
             cells: grid.cells(),
             places: Vec::new(),
         };
@@ -248,6 +257,7 @@ impl Discretisation {
             divergence,
             gradient,
             boundary_load,
+            known_fluxes,
             cells,
             places,
         } = parts;
@@ -259,6 +269,7 @@ impl Discretisation {
             divergence,
             gradient,
             boundary_load,
+            known_fluxes,
             cells,
             places,
         }
@@ -321,6 +332,11 @@ impl Discretisation {
     /// The divergence, integrated over cells, as entries (cell, velocity, signed face area).
     pub(crate) fn divergence(&self) -> &[(usize, usize, f64)] {
         &self.divergence
+    }
+
+    /// Fluxes out of cells through faces whose velocity is given.
+    pub(crate) fn known_fluxes(&self) -> &[(usize, f64)] {
+        &self.known_fluxes
     }
 
     /// Adds the friction of side walls: points that take the velocity for a rate, one for each pair of

@@ -159,6 +159,9 @@ fn divergence_residual(discretisation: &Discretisation, u: &[f64], divergence: &
     for &(cell, j, area) in discretisation.divergence() {
         divergence[cell] += area * u[j];
     }
+    for &(cell, flux) in discretisation.known_fluxes() {
+        divergence[cell] += flux;
+    }
     let volume = discretisation.grid().cell_volume();
     divergence
         .iter()

@@ -12,6 +12,7 @@ use super::fraction::reconstruct;
 use super::ground::contact::sliding_place;
 use super::ground::faces::faces_over;
 use super::ground::{Contact, DUST, Ground, Terrain};
+use super::open_ends::{Inflow, can_open};
 use super::operators::{Material, Operators, POINTS};
 use super::plane::Plane;
 use super::topology::{NONE, Topology};
@@ -46,7 +47,7 @@ impl Default for SurfaceOptions {
     fn default() -> Self {
         Self {
             courant: 0.45,
-            largest_step: 0.1,
+            largest_step: 0.05,
             growth: 1.3,
             thin_layer: ThinLayer::default(),
             solver: PrimalDualOptions {
@@ -145,6 +146,8 @@ pub struct SurfaceState {
     pub velocity_time: f64,
     /// Time step that the velocity is meant for; zero before the first.
     pub next_step: f64,
+    /// Volumes that have flowed in and out through open ends.
+    pub passed: [f64; 2],
     /// Steps made.
     pub steps: usize,
 }
@@ -162,6 +165,7 @@ pub struct SurfaceFlow<R> {
     transport: Transport,
     side_walls: Option<SideWalls>,
     ground: Option<Ground>,
+    inflow: Option<Inflow>,
     /// Matter and ground together.
     filled: Vec<f64>,
     solver: Option<(Vec<usize>, PrimalDual)>,
@@ -212,6 +216,7 @@ impl<R: Rheology> SurfaceFlow<R> {
             transport: Transport::default(),
             side_walls: None,
             ground: None,
+            inflow: None,
             filled: Vec::new(),
             solver: None,
             unknowns: FlowState {
@@ -306,6 +311,28 @@ impl<R: Rheology> SurfaceFlow<R> {
         let points = points.max(self.state.stress.len());
         self.state.stress.resize(points, [0.0; COMPONENTS]);
         self.saved.clone_from(&self.state);
+        Ok(self)
+    }
+
+    /// The same flow with open ends along x: this flows in at the low one, and what comes to the high one flows
+    /// out. Both stand for smooth walls of the grid, over a floor that does not cut its cells.
+    ///
+    /// # Errors
+    /// An inflow that does not fit the grid, ends that are not smooth walls, or ground.
+    pub fn with_open_ends(mut self, inflow: Inflow) -> Result<Self, Error> {
+        let axis = &self.grid.axes()[0];
+        let ends = [0, axis.cells()].map(|face| axis.boundary_at(face));
+        let fits = self.ground.is_none() && ends.iter().all(|end| can_open(end.as_ref()));
+        require(
+            fits,
+            "inflow",
+            axis.spacing() * axis.cells() as f64,
+            "a grid of this length with smooth walls at both ends of x and a level floor",
+        )?;
+        inflow.validate(self.grid.axes()[1].cells())?;
+        inflow.impose(&self.topology, &mut self.state.velocity);
+        self.saved.clone_from(&self.state);
+        self.inflow = Some(inflow);
         Ok(self)
     }
 
@@ -535,10 +562,16 @@ impl<R: Rheology> SurfaceFlow<R> {
                 order: &order,
                 incompressible: &incompressible,
                 ground: self.ground.as_ref(),
+                inflow: self.inflow.as_ref(),
             },
             &mut self.state.fractions,
             &mut self.state.velocity,
         );
+        let volume = self.grid.cell_volume();
+        let passed = self.state.passed.iter_mut().zip(self.transport.passed());
+        for (whole, part) in passed {
+            *whole += part * volume;
+        }
         self.spent.transport += clock.elapsed().as_secs_f64();
     }
 
@@ -577,7 +610,7 @@ impl<R: Rheology> SurfaceFlow<R> {
         let clock = std::time::Instant::now();
         let fractions = &self.state.fractions;
         let (acceleration, thin_layer) = (self.acceleration, self.options.thin_layer);
-        let faces = match &self.ground {
+        let mut faces = match &self.ground {
             None => {
                 reconstruct(&self.topology, fractions, &mut self.planes);
                 Faces::of(
@@ -600,6 +633,9 @@ impl<R: Rheology> SurfaceFlow<R> {
                 faces_over(ground, &self.topology, fractions, acceleration, thin_layer)
             }
         };
+        if let Some(inflow) = &self.inflow {
+            inflow.open(&mut faces);
+        }
         let material = Material {
             grid: &self.grid,
             topology: &self.topology,
@@ -607,6 +643,7 @@ impl<R: Rheology> SurfaceFlow<R> {
             planes: &self.planes,
             faces: &faces,
             side_walls: self.side_walls,
+            inflow: self.inflow.as_ref(),
             acceleration,
         };
         let Operators {
@@ -666,6 +703,7 @@ impl<R: Rheology> SurfaceFlow<R> {
     fn falls_freely(&mut self, discretisation: &Discretisation, dt: f64) -> bool {
         let unknowns = &mut self.unknowns;
         let is_loose = self.ground.is_none()
+            && self.inflow.is_none()
             && unknowns.p.iter().all(|p| *p <= f64::MIN_POSITIVE)
             && unknowns.s.iter().all(|s| *s == [0.0; COMPONENTS])
             && self.rheology.threshold(1.0, 0.0).stress == 0.0
@@ -741,6 +779,9 @@ impl<R: Rheology> SurfaceFlow<R> {
             }
         }
         faces.spread(&self.unknowns.u, &mut self.state.velocity);
+        if let Some(inflow) = &self.inflow {
+            inflow.impose(&self.topology, &mut self.state.velocity);
+        }
         self.state.pressure.fill(INACTIVE);
         for (&cell, p) in faces.active.iter().zip(&self.unknowns.p) {
             self.state.pressure[cell] = *p;

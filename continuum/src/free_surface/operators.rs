@@ -9,6 +9,7 @@
 
 use super::faces::{ACTIVE, Face, Faces, weight_onto};
 use super::fraction::volume_in;
+use super::open_ends::Inflow;
 use super::plane::Plane;
 use super::topology::{NONE, Topology};
 use crate::discretisation::{Discretisation, Parts, QuadraturePoint, VelocityAt, add_corner_shear};
@@ -34,6 +35,8 @@ pub(crate) struct Material<'a> {
     pub faces: &'a Faces,
     /// Walls beside the plane, which rub.
     pub side_walls: Option<SideWalls>,
+    /// What flows in at the low end of x, where the ends are open.
+    pub inflow: Option<&'a Inflow>,
     /// Acceleration by gravity.
     pub acceleration: [f64; DIMENSIONS],
 }
@@ -137,6 +140,9 @@ impl Material<'_> {
                         continue;
                     }
                     let Face::Own(j) = self.faces.role[axis][face] else {
+                        if self.inflow.is_some() && axis == 0 {
+                            self.add_flux_at_edge(p, cell, side, parts);
+                        }
                         continue;
                     };
                     let outwards = if side == 1 { 1.0 } else { -1.0 };
@@ -232,12 +238,14 @@ impl Material<'_> {
             for (axis, orientation) in [(0, 1.0), (1, -1.0)] {
                 self.add_stretching(cell, axis, orientation, &mut point);
             }
-            add_corner_shear(
-                self.grid,
-                |c, face| self.velocity_at(c, face),
-                at,
-                &mut point,
-            );
+            if !self.add_shear_at_edge(at, &mut point) {
+                add_corner_shear(
+                    self.grid,
+                    |c, face| self.velocity_at(c, face),
+                    at,
+                    &mut point,
+                );
+            }
             self.add_corner_pressure(at, &mut point);
             if !point.velocities().is_empty() {
                 point.side = self.grid.axes()[1]
@@ -340,6 +348,8 @@ impl Material<'_> {
                 point.add_velocity(j, 0, orientation * sign * inverse);
             }
         }
+        let known = self.known_velocity(axis, faces[0]);
+        point.add_known_rate(0, -orientation * inverse * known);
     }
 
     /// The pressure at the centre of a cell as an active cell times a factor: its own, or one
@@ -382,6 +392,7 @@ impl Material<'_> {
         let axes = self.grid.axes();
         let wall = (0..DIMENSIONS)
             .rev()
+            .filter(|&axis| axis > 0 || self.inflow.is_none())
             .find(|&axis| axes[axis].boundary_at(corner[axis]).is_some());
         let cells = self.cells_at_corner(corner);
         let count = cells.iter().flatten().count() as f64;

@@ -73,6 +73,7 @@ fn step(
         },
         incompressible: &incompressible,
         ground: None,
+        inflow: None,
     };
     transport.advance(&motion, fractions, velocity);
 }
