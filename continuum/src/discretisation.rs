@@ -80,6 +80,11 @@ impl<const C: usize, const V: usize> QuadraturePoint<C, V> {
         self.rates[component][slot] += coefficient;
     }
 
+    /// Adds to the strain rate what a given velocity contributes.
+    pub(crate) fn add_known_rate(&mut self, component: usize, rate: f64) {
+        self.offset[component] += rate;
+    }
+
     pub(crate) fn add_pressure(&mut self, cell: usize, weight: f64) {
         let known = &self.pressures[..self.pressure_count];
         let slot = known
@@ -185,6 +190,8 @@ pub struct Discretisation<
     /// For each entry of the divergence, the force of the cell's pressure on the velocity.
     gradient: Vec<f64>,
     boundary_load: Vec<f64>,
+    /// Fluxes out of cells through faces whose velocity is given.
+    known_fluxes: Vec<(usize, f64)>,
     cells: usize,
     /// Places of velocities and then cells, where they are known.
     places: Vec<Place<D>>,
@@ -203,6 +210,7 @@ pub(crate) struct Parts<
     pub divergence: Vec<(usize, usize, f64)>,
     pub gradient: Vec<f64>,
     pub boundary_load: Vec<f64>,
+    pub known_fluxes: Vec<(usize, f64)>,
     pub cells: usize,
     /// Places of velocities and then cells in half cells; may be left out.
     pub places: Vec<Place<D>>,
@@ -258,6 +266,7 @@ impl Discretisation {
             gradient: divergence.iter().map(|&(_, _, area)| area).collect(),
             divergence,
             boundary_load,
+            known_fluxes: Vec::new(),
             cells: grid.cells(),
             places: Vec::new(),
         };
@@ -301,6 +310,7 @@ impl<const D: usize, const C: usize, const V: usize> Discretisation<D, C, V> {
             divergence,
             gradient,
             boundary_load,
+            known_fluxes,
             cells,
             places,
         } = parts;
@@ -312,6 +322,7 @@ impl<const D: usize, const C: usize, const V: usize> Discretisation<D, C, V> {
             divergence,
             gradient,
             boundary_load,
+            known_fluxes,
             cells,
             places,
         }
@@ -374,6 +385,11 @@ impl<const D: usize, const C: usize, const V: usize> Discretisation<D, C, V> {
     /// The divergence, integrated over cells, as entries (cell, velocity, signed face area).
     pub(crate) fn divergence(&self) -> &[(usize, usize, f64)] {
         &self.divergence
+    }
+
+    /// Fluxes out of cells through faces whose velocity is given.
+    pub(crate) fn known_fluxes(&self) -> &[(usize, f64)] {
+        &self.known_fluxes
     }
 
     /// Superposes a uniform strain rate on that of the unknown velocities, which are then

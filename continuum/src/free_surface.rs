@@ -13,6 +13,7 @@ mod fields;
 mod flow;
 mod fraction;
 mod ground;
+mod open_ends;
 mod operators;
 mod outside;
 pub mod plane;
@@ -25,4 +26,5 @@ pub use flow::{
     SpaceFlow, SpaceState, Spent, SurfaceFlow, SurfaceOptions, SurfaceState, SurfaceStep,
 };
 pub use ground::{Contact, Terrain};
+pub use open_ends::Inflow;
 pub use outside::Outside;

@@ -178,6 +178,9 @@ fn divergence_residual<const D: usize, const C: usize, const V: usize>(
     for &(cell, j, area) in discretisation.divergence() {
         divergence[cell] += area * u[j];
     }
+    for &(cell, flux) in discretisation.known_fluxes() {
+        divergence[cell] += flux;
+    }
     let volume = discretisation.grid().cell_volume();
     divergence
         .iter()

@@ -12,6 +12,7 @@ use super::fraction::reconstruct;
 use super::ground::contact::sliding_place;
 use super::ground::faces::faces_over;
 use super::ground::{Contact, DUST, Ground, Terrain};
+use super::open_ends::{Inflow, can_open};
 use super::operators::{Material, Operators, POINTS, points_of};
 use super::outside::Outside;
 use super::plane::Plane;
@@ -48,7 +49,7 @@ impl Default for SurfaceOptions {
     fn default() -> Self {
         Self {
             courant: 0.45,
-            largest_step: 0.1,
+            largest_step: 0.05,
             growth: 1.3,
             thin_layer: ThinLayer::default(),
             solver: PrimalDualOptions {
@@ -147,6 +148,8 @@ pub struct SurfaceState<const D: usize = DIMENSIONS, const C: usize = COMPONENTS
     pub velocity_time: f64,
     /// Time step that the velocity is meant for; zero before the first.
     pub next_step: f64,
+    /// Volumes that have flowed in and out through open ends.
+    pub passed: [f64; 2],
     /// Steps made.
     pub steps: usize,
 }
@@ -162,6 +165,7 @@ impl<const D: usize, const C: usize> Default for SurfaceState<D, C> {
             velocity_time: 0.0,
             next_step: 0.0,
             steps: 0,
+            passed: [0.0; 2],
         }
     }
 }
@@ -202,6 +206,7 @@ pub struct SurfaceFlow<
     outside: Option<Outside>,
     /// Impulse of forces from outside that nobody has taken.
     untaken: [f64; DIMENSIONS],
+    inflow: Option<Inflow>,
     /// Matter and ground together.
     filled: Vec<f64>,
     solver: Option<(Vec<usize>, PrimalDual<C>)>,
@@ -237,6 +242,28 @@ impl<R: Rheology> SurfaceFlow<R> {
         options: SurfaceOptions,
     ) -> Result<Self, Error> {
         Self::filling(grid, fractions, rheology, acceleration, options)
+    }
+
+    /// The same flow with open ends along x: this flows in at the low one, and what comes to the high one flows
+    /// out. Both stand for smooth walls of the grid, over a floor that does not cut its cells.
+    ///
+    /// # Errors
+    /// An inflow that does not fit the grid, ends that are not smooth walls, or ground.
+    pub fn with_open_ends(mut self, inflow: Inflow) -> Result<Self, Error> {
+        let axis = &self.grid.axes()[0];
+        let ends = [0, axis.cells()].map(|face| axis.boundary_at(face));
+        let fits = self.bed.is_none() && ends.iter().all(|end| can_open(end.as_ref()));
+        require(
+            fits,
+            "inflow",
+            axis.spacing() * axis.cells() as f64,
+            "a grid of this length with smooth walls at both ends of x and a level floor",
+        )?;
+        inflow.validate(self.grid.axes()[1].cells())?;
+        inflow.impose(&self.topology, &mut self.state.velocity);
+        self.saved.clone_from(&self.state);
+        self.inflow = Some(inflow);
+        Ok(self)
     }
 
     /// From now on this acts from outside; on a flow over ground nothing does.
@@ -362,6 +389,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             transport: Transport::default(),
             side_walls: None,
             bed: None,
+            inflow: None,
             outside: None,
             untaken: [0.0; DIMENSIONS],
             filled: Vec::new(),
@@ -644,10 +672,16 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                 orders: &orders,
                 incompressible: &incompressible,
                 ground: self.bed.as_ref().map(|bed| &bed.ground),
+                inflow: self.inflow.as_ref(),
             },
             &mut self.state.fractions,
             &mut self.state.velocity,
         );
+        let volume = self.grid.cell_volume();
+        let passed = self.state.passed.iter_mut().zip(self.transport.passed());
+        for (whole, part) in passed {
+            *whole += part * volume;
+        }
         self.spent.transport += clock.elapsed().as_secs_f64();
     }
 
@@ -686,7 +720,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         let clock = std::time::Instant::now();
         let fractions = &self.state.fractions;
         let (acceleration, thin_layer) = (self.acceleration, self.options.thin_layer);
-        let faces = match &self.bed {
+        let mut faces = match &self.bed {
             None => {
                 reconstruct(&self.topology, fractions, &mut self.planes);
                 Faces::of(
@@ -709,6 +743,9 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                 faces(ground, &self.topology, fractions, acceleration, thin_layer)
             }
         };
+        if let Some(inflow) = &self.inflow {
+            inflow.open(&mut faces);
+        }
         let material = Material {
             grid: &self.grid,
             topology: &self.topology,
@@ -716,6 +753,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             planes: &self.planes,
             faces: &faces,
             side_walls: self.side_walls,
+            inflow: self.inflow.as_ref(),
             acceleration,
             outside: self.outside.as_ref(),
         };
@@ -783,6 +821,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         let unknowns = &mut self.unknowns;
         let is_loose = self.bed.is_none()
             && self.outside.is_none()
+            && self.inflow.is_none()
             && unknowns.p.iter().all(|p| *p <= f64::MIN_POSITIVE)
             && unknowns.s.iter().all(|s| *s == [0.0; C])
             && self.rheology.threshold(1.0, 0.0).stress == 0.0
@@ -858,6 +897,9 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             }
         }
         faces.spread(&self.unknowns.u, &mut self.state.velocity);
+        if let Some(inflow) = &self.inflow {
+            inflow.impose(&self.topology, &mut self.state.velocity);
+        }
         self.state.pressure.fill(INACTIVE);
         for (&cell, p) in faces.active.iter().zip(&self.unknowns.p) {
             self.state.pressure[cell] = *p;

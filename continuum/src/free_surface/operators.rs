@@ -9,6 +9,7 @@
 
 use super::faces::{ACTIVE, ALIKE, Face, Faces, weight_onto};
 use super::fraction::volume_in;
+use super::open_ends::Inflow;
 use super::outside::Outside;
 use super::plane::Plane;
 use super::topology::{NONE, Topology};
@@ -43,6 +44,8 @@ pub(crate) struct Material<'a, const D: usize = DIMENSIONS> {
     pub faces: &'a Faces<D>,
     /// Walls beside the plane, which rub.
     pub side_walls: Option<SideWalls>,
+    /// What flows in at the low end of x, where the ends are open.
+    pub inflow: Option<&'a Inflow>,
     /// Acceleration by gravity.
     pub acceleration: [f64; D],
     /// What lies beyond the surface, if it is not free.
@@ -158,6 +161,9 @@ impl<const D: usize> Material<'_, D> {
                         continue;
                     }
                     let Face::Own(j) = self.faces.role[axis][face] else {
+                        if self.inflow.is_some() && axis == 0 {
+                            self.add_flux_at_edge(p, cell, side, parts);
+                        }
                         continue;
                     };
                     let outwards = if side == 1 { 1.0 } else { -1.0 };
@@ -257,15 +263,24 @@ impl<const D: usize> Material<'_, D> {
                     self.add_stretching(cell, axis, row, orientation, &mut point);
                 }
             }
-            for high in 1..D {
-                for low in 0..high {
-                    // The edge through the corner: a cell along the other axes.
-                    let mut edge = index;
-                    edge[low] = at[low];
-                    edge[high] = at[high];
-                    let row = shear_row::<D>(low, high);
-                    let velocity_at = |c, face| self.velocity_at(c, face);
-                    add_corner_shear(self.grid, velocity_at, edge, [low, high], row, &mut point);
+            if !self.add_shear_at_edge(at, &mut point) {
+                for high in 1..D {
+                    for low in 0..high {
+                        // The edge through the corner: a cell along the other axes.
+                        let mut edge = index;
+                        edge[low] = at[low];
+                        edge[high] = at[high];
+                        let row = shear_row::<D>(low, high);
+                        let velocity_at = |c, face| self.velocity_at(c, face);
+                        add_corner_shear(
+                            self.grid,
+                            velocity_at,
+                            edge,
+                            [low, high],
+                            row,
+                            &mut point,
+                        );
+                    }
                 }
             }
             self.add_corner_pressure(at, &mut point);
@@ -373,6 +388,8 @@ impl<const D: usize> Material<'_, D> {
                 point.add_velocity(j, row, orientation * sign * inverse);
             }
         }
+        let known = self.known_velocity(axis, faces[0]);
+        point.add_known_rate(0, -orientation * inverse * known);
     }
 
     /// The pressure at the centre of a cell as an active cell times a factor: its own, or one
@@ -454,6 +471,7 @@ impl<const D: usize> Material<'_, D> {
         let axes = self.grid.axes();
         let wall = (0..D)
             .rev()
+            .filter(|&axis| axis > 0 || self.inflow.is_none())
             .find(|&axis| axes[axis].boundary_at(corner[axis]).is_some());
         let count = self.cells_at_corner(corner).count() as f64;
         for cell in self.cells_at_corner(corner) {

@@ -13,6 +13,7 @@
 use super::faces::ACTIVE;
 use super::fraction::{reconstruct, volume_in};
 use super::ground::Ground;
+use super::open_ends::Inflow;
 use super::plane::Plane;
 use super::topology::{NONE, Topology};
 use crate::grid::DIMENSIONS;
@@ -46,6 +47,8 @@ pub(crate) struct Transport<const D: usize = DIMENSIONS> {
     before: (Vec<f64>, Velocity<D>),
     /// Fractions and momenta, their mean over the orders.
     mean: (Vec<f64>, Velocity<D>),
+    /// Volumes that flowed in and out through open ends in the last step, in cell volumes.
+    passed: [f64; 2],
 }
 
 /// What moves, and how fast.
@@ -61,6 +64,8 @@ pub(crate) struct Motion<'a, const D: usize = DIMENSIONS> {
     pub incompressible: &'a [bool],
     /// Ground that cuts cells and faces.
     pub ground: Option<&'a Ground<D>>,
+    /// What flows in at the low end of x, where the ends are open.
+    pub inflow: Option<&'a Inflow>,
 }
 
 impl<const D: usize> Motion<'_, D> {
@@ -88,6 +93,7 @@ impl<const D: usize> Default for Transport<D> {
             momentum: Vec::new(),
             before: (Vec::new(), components()),
             mean: (Vec::new(), components()),
+            passed: [0.0; 2],
         }
     }
 }
@@ -101,6 +107,7 @@ impl<const D: usize> Transport<D> {
         velocity: &mut Velocity<D>,
     ) {
         self.start.clone_from(velocity);
+        self.passed = [0.0; 2];
         for _ in 0..motion.passes {
             match motion.orders {
                 [order] => self.pass(motion, order, fractions, velocity),
@@ -171,6 +178,9 @@ impl<const D: usize> Transport<D> {
                 None => {
                     reconstruct(motion.topology, fractions, &mut self.planes);
                     self.volume_fluxes(motion, fractions, axis);
+                    if let (Some(inflow), 0) = (motion.inflow, axis) {
+                        self.pass_ends(motion, inflow, fractions);
+                    }
                 }
                 Some(ground) => {
                     ground.fill(fractions, &mut self.filled);
@@ -186,6 +196,28 @@ impl<const D: usize> Transport<D> {
         }
         if let Some(ground) = motion.ground {
             ground.settle(motion.topology, fractions);
+        }
+    }
+
+    /// Volumes that flowed in and out in the last step, in cell volumes.
+    pub(crate) fn passed(&self) -> [f64; 2] {
+        self.passed
+    }
+
+    /// Volume through open ends.
+    fn pass_ends(&mut self, motion: &Motion<'_, D>, inflow: &Inflow, fractions: &[f64]) {
+        let start = &self.start[0];
+        let width = start.len() / inflow.speeds.len();
+        for (row, filled) in inflow.fractions.iter().enumerate() {
+            let (first, last) = (row * width, row * width + width - 1);
+            let length = |face: usize| (start[face] * motion.courant[0]).max(0.0);
+            self.fluxes[first] = length(first) * filled;
+            let (donor, through) = (motion.topology.face_cells[0][last][0], length(last));
+            let (from, to) = ([1.0 - through, 0.0, 0.0], [1.0; 3]);
+            let volume = volume_in(fractions[donor], self.planes[donor].as_ref(), from, to);
+            self.fluxes[last] = volume.clamp(0.0, fractions[donor]);
+            self.passed[0] += self.fluxes[first];
+            self.passed[1] += self.fluxes[last];
         }
     }
 
@@ -349,6 +381,17 @@ impl<const D: usize> Transport<D> {
             let carried = u[donor] + 0.5 * slope * (1.0 - (volume.abs() / own).min(1.0));
             self.momentum[face] -= volume * carried;
             self.momentum[next] += volume * carried;
+        }
+        if let (Some(inflow), 0, 1) = (motion.inflow, axis, component) {
+            // What leaves takes its momentum along.
+            let columns = topology.faces(0) / inflow.speeds.len() - 1;
+            for face in (columns - 1..u.len()).step_by(columns) {
+                let out = topology.face_cells[component][face].map(|cell| match cell {
+                    NONE => 0.0,
+                    cell => self.fluxes[topology.cell_faces[cell][0][1]],
+                });
+                self.momentum[face] -= 0.5 * (out[0] + out[1]) * u[face];
+            }
         }
         for (face, u) in velocity[component].iter_mut().enumerate() {
             let mass = topology.face_mean(component, face, &self.next);

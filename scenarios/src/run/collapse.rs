@@ -235,6 +235,7 @@ impl Course {
             velocity_time: *time.get(1)?,
             next_step: *time.get(2)?,
             steps: *record.counts.get("steps")?.first()? as usize,
+            ..SurfaceState::default()
         };
         let fronts = numbers("course/fronts")?;
         let profiles = numbers("course/profiles")?;

@@ -82,6 +82,7 @@ fn step(
         orders: &orders,
         incompressible: &incompressible,
         ground: None,
+        inflow: None,
     };
     transport.advance(&motion, fractions, velocity);
 }

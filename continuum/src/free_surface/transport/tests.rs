@@ -74,6 +74,7 @@ fn step(
         orders: &[order],
         incompressible: &incompressible,
         ground: None,
+        inflow: None,
     };
     transport.advance(&motion, fractions, velocity);
 }
