@@ -15,8 +15,9 @@ pub use verdict::Verdict;
 
 use crate::calibration::thesis::{EstimatorFit, VelocityProfile, estimator_fits};
 use crate::calibration::{
-    Alternative, FreeForm, LocalPoint, MuIFit, Posterior, ResidualTests, Stress, compare_laws,
-    fit_free_form, fit_mu_i, pressure_ratio, residual_tests, sample_posterior,
+    Alternative, BulkFlow, FreeForm, LeftOut, LocalPoint, MuIFit, Posterior, ResidualTests, Stress,
+    compare_laws, fit_free_form, fit_mu_i, left_out, pressure_ratio, residual_tests,
+    sample_posterior,
 };
 use crate::incline::{Cost, InclineResult, InclineRun, InclineSpec, Purpose, Start};
 use rayon::prelude::*;
@@ -105,6 +106,9 @@ pub struct CampaignResult {
     /// p/σ_zz of the points: mean and standard deviation.
     #[serde(default)]
     pub pressure_ratio: Option<(f64, f64)>,
+    /// Each flow beside the laws of |τ|/p and then of |τ|/σ_zz that were fitted without it.
+    #[serde(default)]
+    pub left_out: Vec<LeftOut>,
 }
 
 /// Steps between looks at the stop flag.
@@ -141,8 +145,12 @@ pub fn run_campaign(
         Depth(usize),
         Flow(f64, usize),
     }
-    let mut tasks = vec![Task::Stop, Task::Onset];
-    tasks.extend(spec.depth_beds().map(Task::Depth));
+    let mut tasks = Vec::new();
+    if spec.searches {
+        tasks.extend([Task::Stop, Task::Onset]);
+        tasks.extend(spec.depth_beds().map(Task::Depth));
+    }
+    let searches = tasks.len();
     let angles = spec.sorted_flow_angles().into_iter().rev();
     let flow_beds = spec.full_beds().take(spec.flow_beds.max(1)).rev();
     tasks.extend(angles.flat_map(|angle| flow_beds.clone().map(move |bed| Task::Flow(angle, bed))));
@@ -170,11 +178,16 @@ pub fn run_campaign(
     for group in finished {
         groups.push(group?);
     }
+    let flows: Vec<InclineResult> = groups
+        .split_off(searches)
+        .into_iter()
+        .rev()
+        .flatten()
+        .collect();
     let mut groups = groups.into_iter();
     let stop_runs = groups.next().unwrap_or_default();
     let onset_runs = groups.next().unwrap_or_default();
-    let depth_runs: Vec<Vec<InclineResult>> = groups.by_ref().take(spec.depths.len()).collect();
-    let flows: Vec<InclineResult> = groups.rev().flatten().collect();
+    let depth_runs: Vec<Vec<InclineResult>> = groups.collect();
     Ok(evaluate(spec, flows, stop_runs, onset_runs, depth_runs))
 }
 
@@ -266,6 +279,11 @@ pub fn evaluate(
         points: &points,
     });
     let pressure_ratio = pressure_ratio(&points);
+    let bulks: Vec<BulkFlow> = used.iter().filter_map(|r| bulk(spec, r)).collect();
+    let left_out = [Stress::MeanPressure, Stress::NormalPressure]
+        .iter()
+        .flat_map(|stress| left_out(&bulks, *stress, spec.seed))
+        .collect();
     let [fit, fit_zz, fit_slope] = fits.map(Result::ok);
     CampaignResult {
         runs: flows
@@ -293,7 +311,19 @@ pub fn evaluate(
         posterior,
         posterior_zz,
         pressure_ratio,
+        left_out,
     }
+}
+
+/// The bulk of a flow, as a law is to predict it.
+pub fn bulk(spec: &CampaignSpec, run: &InclineResult) -> Option<BulkFlow> {
+    let base = &spec.base;
+    BulkFlow::of(
+        run.profile.as_ref()?,
+        &run.points,
+        base.diameter,
+        base.grain_density,
+    )
 }
 
 impl Watch<'_> {

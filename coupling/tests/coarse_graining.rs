@@ -349,6 +349,59 @@ fn speed_gained_while_averaging_is_no_temperature() {
 }
 
 #[test]
+fn what_a_swelling_flow_carries_upwards_is_no_stress() {
+    // Grains in free flight along parabolas, faster the higher they are and rising together: no contact bears anything,
+    // and the mean flow carries much of the weight's worth of momentum through every layer.
+    let gravity = Vector3::new(4.0, 0.0, -8.0);
+    let mut rng = ChaCha8Rng::seed_from_u64(9);
+    let grains: Vec<GrainSample> = (0..400)
+        .map(|id| {
+            let place = |high: f64, rng: &mut ChaCha8Rng| rng.random_range(0.0..high);
+            let position = Vector3::new(
+                place(3.0, &mut rng),
+                place(2.0, &mut rng),
+                place(6.0, &mut rng),
+            );
+            GrainSample {
+                velocity: Vector3::new(3.0 * position.z, 0.0, 2.5),
+                ..grain(id, position, 0.2, false)
+            }
+        })
+        .collect();
+    let layers = Layering {
+        lower: -1.0,
+        thickness: 0.5,
+        count: 20,
+    };
+    let mut averager = Averager::new(Lucy { half_width: 0.5 }, layers).unwrap();
+    for k in 0..=2000 {
+        let t = 2e-4 * f64::from(k);
+        let mut s = network_at_rest(1);
+        s.time = t;
+        s.gravity = gravity;
+        (s.contacts, s.bonds) = (Vec::new(), Vec::new());
+        s.grains = grains.clone();
+        for g in &mut s.grains {
+            g.position += g.velocity * t + 0.5 * t * t * gravity;
+            g.velocity += gravity * t;
+        }
+        averager.sample(&s);
+    }
+    let profile = averager.profile(0.4, 2600.0);
+    let balance = profile.balance;
+    println!("{balance:?}");
+    assert!(balance.downslope_relative < 2e-3, "{balance:?}");
+    assert!(balance.normal_relative < 2e-3, "{balance:?}");
+    // Without what is carried the balance would miss this much.
+    let weight = grains.iter().map(|g| g.mass).sum::<f64>() * 80f64.sqrt() / 6.0;
+    let carried = |r: &colluvium_coupling::coarse_graining::ProfileRow| {
+        (r.density.value * r.u.value * r.w.value).abs() / weight
+    };
+    let most = profile.rows.iter().map(carried).fold(0.0, f64::max);
+    assert!(most > 0.05, "{most}");
+}
+
+#[test]
 fn block_errors_cover_correlated_samples() {
     // Mean velocity follows an AR(1) process with coefficient 0.9 over 3000 samples.
     let mut rng = ChaCha8Rng::seed_from_u64(11);

@@ -286,6 +286,7 @@ fn tiny_campaign() -> CampaignSpec {
             mu_2: 0.95,
             i_0: 0.6,
         },
+        searches: true,
         stop: Bracket {
             low: 20.0,
             high: 34.0,

@@ -189,6 +189,7 @@ fn campaign_spec(scene: &Scene, body: &InclineScene, bed: &Bed, beds: Beds) -> C
             mu_2: keys.guess.mu_2,
             i_0: keys.guess.i_0,
         },
+        searches: keys.search,
         stop: bracket(keys.stop),
         onset: bracket(keys.onset),
         search_time: keys.search_time,

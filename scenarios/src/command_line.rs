@@ -5,6 +5,7 @@ use crate::calibrate;
 use crate::coarse_grain;
 use crate::failure::Failure;
 use crate::grain_files::Unsaid;
+use crate::map;
 use crate::pareto;
 use crate::plan;
 use crate::render;
@@ -63,6 +64,36 @@ enum Command {
         scene: SceneArguments,
         #[command(flatten)]
         how: RunArguments,
+    },
+    /// Measure angle of repose and μ(I) on a grid of β and μ_R; what is finished in the directory is not run again
+    Map {
+        #[command(flatten)]
+        scene: SceneArguments,
+        /// Values of β, the shape parameter of contact.rolling
+        #[arg(
+            long,
+            value_name = "A,B,...",
+            value_delimiter = ',',
+            default_value = "0.1,0.3,1"
+        )]
+        beta: Vec<f64>,
+        /// Values of μ_R, its rolling friction
+        #[arg(
+            long,
+            value_name = "A,B,...",
+            value_delimiter = ',',
+            default_value = "0.5,1.05,2"
+        )]
+        rolling_friction: Vec<f64>,
+        /// Beds whose angles of repose are averaged
+        #[arg(long, value_name = "N", default_value_t = 1, value_parser = clap::value_parser!(u16).range(1..=64))]
+        beds: u16,
+        /// Directory of the runs, map.toml, map.csv and the report
+        #[arg(long, value_name = "DIR")]
+        out: PathBuf,
+        /// Threads
+        #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
+        threads: Option<u16>,
     },
     /// Run a scene with several values of one key: error against cost
     Pareto {
@@ -168,7 +199,8 @@ struct CoarseGrainArguments {
     #[arg(long, value_name = "FILE")]
     contacts: Option<PathBuf>,
     /// Columns of that dump: id1,id2,fx,fy,fz, and tx,ty,tz for torques; a+b adds two, as for LAMMPS' pair/local, whose
-    /// fx,fy,fz are the normal force and p1,p2,p3 the tangential one [default: the first five]
+    /// fx,fy,fz are the normal force and p1,p2,p3 the tangential one; LIGGGHTS' pair/gran/local has forces from the fourth
+    /// on [default: the first five]
     #[arg(long, value_name = "NAMES", value_delimiter = ',')]
     contact_columns: Vec<String>,
     /// Kernel
@@ -373,6 +405,24 @@ pub fn execute(line: CommandLine) -> Result<(), Failure> {
         }
         Command::Calibrate { scene, how } => {
             say(&calibrate::calibrate(&scene.load()?, &how.options())?)?;
+        }
+        Command::Map {
+            scene,
+            beta,
+            rolling_friction,
+            beds,
+            out,
+            threads,
+        } => {
+            let (file, report) = map::measure(&map::Request {
+                scene: scene.load()?,
+                betas: beta,
+                rolling: rolling_friction,
+                beds: u64::from(beds),
+                out,
+                threads: threads.map(usize::from),
+            })?;
+            print(&format!("{}\n{}", file.display(), report.display()));
         }
         Command::Pareto {
             scene,

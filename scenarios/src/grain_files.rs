@@ -188,9 +188,14 @@ fn snapshot(instant: &Instant, unsaid: &Unsaid) -> Result<Snapshot, String> {
             });
             continue;
         }
-        let [torque, partner_torque] = link
-            .torques
-            .unwrap_or_else(|| [plain(arm, link.force), plain(partner_arm, -link.force)]);
+        let both = [plain(arm, link.force), plain(partner_arm, -link.force)];
+        let [torque, partner_torque] = match (link.torques, link.arm) {
+            // A dump tells the torque on the first grain. What is beyond the force's, rolling and twisting, turns the
+            // second the other way; the force's own goes by the arms.
+            (Some([torque, _]), None) => [torque, both[1] - (torque - both[0])],
+            (Some(told), Some(_)) => told,
+            (None, _) => both,
+        };
         contacts.push(ContactSample {
             grain: first,
             partner: Partner::Grain(second),

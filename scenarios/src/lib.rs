@@ -18,6 +18,7 @@ pub mod grain_files;
 pub mod height_files;
 pub mod interruption;
 pub mod journal;
+pub mod map;
 pub mod mesh_files;
 pub mod pareto;
 pub mod plan;

@@ -1,5 +1,6 @@
 //! `rheology.toml`: a μ(I) law with its errors, its validity and its provenance.
 
+use crate::map::MapFile;
 use crate::scene::{SceneError, check_continuum_keys, layers};
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
@@ -18,6 +19,16 @@ pub const ALTERNATIVES: &[&[&str]] = &[
     &["rheology.file", "rheology.identified"],
     &["rheology.file", "rheology.good"],
     &["rheology.file", "rheology.source"],
+    &["rheology.from", "rheology.file"],
+    &["rheology.from", "rheology.mu_s"],
+    &["rheology.from", "rheology.mu_2"],
+    &["rheology.from", "rheology.i_0"],
+    &["rheology.from", "rheology.table"],
+    &["rheology.from", "rheology.solid_fraction"],
+    &["rheology.from", "rheology.valid_i"],
+    &["rheology.from", "rheology.identified"],
+    &["rheology.from", "rheology.good"],
+    &["rheology.from", "rheology.source"],
 ];
 
 /// Which stress friction is measured against.
@@ -233,30 +244,68 @@ impl RheologyFile {
     }
 }
 
-/// Puts the numbers of the file in the place of `rheology.file`; gives the file's path.
+/// Puts the numbers of the file in the place of `rheology.file`, or those of a place on a map in the place of
+/// `rheology.from`; gives the file's path.
 ///
 /// The resolved scene then stands alone: it can be run again when the file has gone.
 pub fn resolve(table: &mut Table, friction: FrictionOf) -> Result<Option<PathBuf>, SceneError> {
     let Some(Value::Table(rheology)) = table.get_mut("rheology") else {
         return Ok(None);
     };
-    let Some(Value::String(path)) = rheology.remove("file") else {
-        return Ok(None);
-    };
-    let mut law = RheologyFile::read(Path::new(&path))?;
-    let source = match (friction, law.mu_zz.take()) {
-        (FrictionOf::NormalStress, Some(fit)) => {
-            (law.mu_s, law.mu_2, law.i_0) = (fit.mu_s, fit.mu_2, fit.i_0);
-            law.check().map_err(|message| SceneError::Rheology {
-                path: path.clone(),
-                message: format!("[mu_zz]: {message}"),
-            })?;
-            format!("{path}, friction against sigma_zz")
+    let place = rheology.remove("from");
+    let on_a_map = place.is_some();
+    let (mut law, path, mut source) = match (rheology.remove("file"), place) {
+        (Some(Value::String(path)), _) => {
+            let law = RheologyFile::read(Path::new(&path))?;
+            (law, Some(PathBuf::from(&path)), path)
         }
-        _ => path.clone(),
+        (_, Some(Value::Table(place))) => on_map(&place)?,
+        _ => return Ok(None),
     };
-    rheology.extend(law.scene_keys(&source));
-    Ok(Some(PathBuf::from(path)))
+    if let (FrictionOf::NormalStress, Some(fit)) = (friction, law.mu_zz.take()) {
+        (law.mu_s, law.mu_2, law.i_0) = (fit.mu_s, fit.mu_2, fit.i_0);
+        law.check().map_err(|message| SceneError::Rheology {
+            path: source.clone(),
+            message: format!("[mu_zz]: {message}"),
+        })?;
+        source.push_str(", friction against sigma_zz");
+    }
+    let mut keys = law.scene_keys(&source);
+    // Grains of another size obey the same law: a map's numbers give way to what is written beside it.
+    if on_a_map {
+        keys.retain(|key, _| !rheology.contains_key(key));
+    }
+    rheology.extend(keys);
+    Ok(path)
+}
+
+/// The law at a place on a map, the map's file, and where the law is from.
+fn on_map(place: &Table) -> Result<(RheologyFile, Option<PathBuf>, String), SceneError> {
+    let number = |key: &str| match place.get(key) {
+        Some(Value::Float(x)) => *x,
+        Some(Value::Integer(n)) => *n as f64,
+        _ => f64::NAN,
+    };
+    let path = place.get("map").and_then(Value::as_str).unwrap_or_default();
+    let (beta, mu_r) = (number("beta"), number("mu_r"));
+    let fail = |message: String| SceneError::Rheology {
+        path: path.to_owned(),
+        message: format!("rheology.from: {message}"),
+    };
+    let law = MapFile::read(Path::new(path))?
+        .rheology(beta, mu_r)
+        .map_err(|error| fail(error.to_string()))?;
+    law.check().map_err(fail)?;
+    let told = law.provenance.as_ref().map(|p| p.scene.clone());
+    let told = told.unwrap_or_default();
+    let with = |value: f64, error: Option<f64>| format!("{value:.3} ± {:.3}", error.unwrap_or(0.0));
+    let source = format!(
+        "{told}: mu_s {}, mu_2 {}, I_0 {}, interpolation included",
+        with(law.mu_s, law.mu_s_error),
+        with(law.mu_2, law.mu_2_error),
+        with(law.i_0, law.i_0_error)
+    );
+    Ok((law, Some(PathBuf::from(path)), source))
 }
 
 /// Makes the path of a rheology file in a scene file relative to that file's folder, unless it is the name of a bundled
@@ -267,6 +316,7 @@ pub fn anchor(table: &mut Table, folder: &Path) {
     if !bundled || named.is_some_and(|path| folder.join(path).exists()) {
         layers::anchor_path(table, "rheology.file", folder);
     }
+    layers::anchor_path(table, "rheology.from.map", folder);
 }
 
 /// Removes from a layer what it says about its law where the layer above gives other numbers: the

@@ -40,6 +40,7 @@ use crate::run_directory::{self, RunDirectory};
 use crate::scene::{InclineModel, Scene, SceneBody};
 use crate::summary::{Status, Summary};
 use crate::table::Table;
+pub use angle_of_repose::PUBLISHED_ANGLES;
 use colluvium_dem::{Record, Threads};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};

@@ -478,12 +478,13 @@ fn alternatives(name: &str) -> &'static [&'static [&'static str]] {
 }
 
 /// Alternatives of inclines: the stiffness, and a rheology file or numbers.
-const INCLINE_CHOICES: [&[&str]; 12] = {
-    let mut choices: [&[&str]; 12] = [&[
+const INCLINE_CHOICES: [&[&str]; 1 + rheology_file::ALTERNATIVES.len()] = {
+    let mut choices: [&[&str]; 1 + rheology_file::ALTERNATIVES.len()] = [&[
         "contact.stiffness_scaled",
         "contact.stiffness",
         "contact.stiffness_from_speed",
-    ]; 12];
+    ];
+        1 + rheology_file::ALTERNATIVES.len()];
     let mut k = 0;
     while k < rheology_file::ALTERNATIVES.len() {
         choices[k + 1] = rheology_file::ALTERNATIVES[k];

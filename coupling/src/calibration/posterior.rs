@@ -177,7 +177,12 @@ impl Posterior {
     /// no sample gives a number.
     pub fn band(&self, of: impl Fn([f64; 3]) -> f64) -> Option<[f64; 5]> {
         let values: Vec<f64> = self.samples.iter().map(|s| of(*s)).collect();
-        let band = QUANTILES.map(|q| quantile(&values, |x| *x, q));
+        Self::quantiles_of(&values)
+    }
+
+    /// The same quantiles of numbers, one for each sample.
+    pub(super) fn quantiles_of(values: &[f64]) -> Option<[f64; 5]> {
+        let band = QUANTILES.map(|q| quantile(values, |x| *x, q));
         band[0].is_finite().then_some(band)
     }
 }

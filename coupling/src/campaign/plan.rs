@@ -60,6 +60,8 @@ pub struct CampaignSpec {
     pub flow_angles_degrees: Vec<f64>,
     /// Starting velocities of measured flows.
     pub guessed_law: GuessedLaw,
+    /// Whether stop and onset are sought; without, flows alone are measured.
+    pub searches: bool,
     /// Search for the slope where flow stops.
     pub stop: Bracket,
     /// Search for the slope where a bed at rest starts.
@@ -264,7 +266,12 @@ impl CampaignSpec {
         let runs = |b: &Bracket| 2.0 + ((b.high - b.low) / b.resolution).log2().ceil().max(0.0);
         let flows = self.flow_angles_degrees.len() as f64 * steps(self.base.max_time);
         let beds = 1.0 + self.other_beds.len() as f64;
-        let searches = (runs(&self.stop) + runs(&self.onset)) * steps(self.search_time);
+        let sought = if self.searches {
+            runs(&self.stop) + runs(&self.onset)
+        } else {
+            0.0
+        };
+        let searches = sought * steps(self.search_time);
         let full = flows * self.flow_beds as f64 + searches * beds;
         let shallow: usize = self.depths.iter().map(|bed| bed.grains.len()).sum();
         let depths = runs(&self.stop) * steps(self.search_time) * shallow as f64;

@@ -55,9 +55,9 @@ pub struct ProfileRow {
     pub mu: Option<Estimate>,
     /// τ/σ_zz.
     pub mu_zz: Option<Estimate>,
-    /// What the momentum of all that lies above asks of τ/σ_zz: `(g_x M − ∂J_x/∂t)/(∂J_z/∂t − g_z M)`, M its mass and J its
-    /// momentum. In a steady flow tan θ; less where the flow becomes faster, most near its surface. None where a wall
-    /// bears some of it.
+    /// What the momentum of all that lies above asks of τ/σ_zz: `(g_x M − ∂J_x/∂t + ρUW)/(∂J_z/∂t − ρW² − g_z M)`, M its mass, J
+    /// its momentum and ρUW what the mean flow carries through the layer while it swells or sinks. In a steady flow tan θ;
+    /// less where the flow becomes faster, most near its surface. None where a wall bears some of it.
     #[serde(default)]
     pub mu_zz_balance: Option<f64>,
 }
@@ -121,7 +121,8 @@ mod q {
     pub const I: usize = 21;
     pub const MU: usize = 22;
     pub const MU_ZZ: usize = 23;
-    pub const COUNT: usize = 24;
+    pub const CARRIED: usize = 24;
+    pub const COUNT: usize = 27;
 }
 
 type Quantities = [f64; q::COUNT];
@@ -172,10 +173,13 @@ pub(super) fn mean_rows(
             let mut kinetic_trace = 0.0;
             for i in 0..3 {
                 for j in 0..3 {
-                    let fluctuation = per_mass(field::FLUX + PART[i][j])
-                        - velocity[i] * velocity[j]
-                        - slope[i] * slope[j] * spread
-                        - gain[i] * gain[j] * ages;
+                    let mean_flow = velocity[i] * velocity[j]
+                        + slope[i] * slope[j] * spread
+                        + gain[i] * gain[j] * ages;
+                    if j == 2 {
+                        row[q::CARRIED + i] = row[q::DENSITY] * mean_flow;
+                    }
+                    let fluctuation = per_mass(field::FLUX + PART[i][j]) - mean_flow;
                     row[q::STRESS + 3 * i + j] =
                         at(field::CONTACT + 3 * i + j) / volume - row[q::DENSITY] * fluctuation;
                     if i == j {
@@ -311,7 +315,9 @@ impl Profile {
 
 impl BalanceCheck {
     /// Integrates ∂ₜj + ∇·(ρuu − σ) = t + ρg from the top down to each layer, averaged over the layer:
-    /// −σ_αz = ∂ₜJ_above − g_α M_above − T_above (per floor area). With it, what that makes of τ/σ_zz in each layer.
+    /// −σ_αz = ∂ₜJ_above − g_α M_above − T_above − ρ U_α W (per floor area): a flow that swells or sinks while it is
+    /// averaged carries its momentum through the layer, which is no stress. With it, what that makes of τ/σ_zz in each
+    /// layer.
     pub(super) fn of(
         sums: &[f64],
         samples: u64,
@@ -344,18 +350,17 @@ impl BalanceCheck {
         for k in (0..n).rev() {
             let at = |f: usize| sums[f * n + k];
             let mass_above = (mass_higher + at(field::MASS_ABOVE)) / s / floor_area;
+            let momentum = |axis: usize| {
+                gravity[axis] * mass_above - momentum_rate_above(axis, k) / floor_area
+                    + means[k][q::CARRIED + axis]
+            };
             let residual = |axis: usize| {
                 let wall = (wall_higher[axis] + at(field::WALL_ABOVE + axis)) / s / floor_area;
-                -means[k][q::STRESS + 3 * axis + 2] - momentum_rate_above(axis, k) / floor_area
-                    + gravity[axis] * mass_above
-                    + wall
+                momentum(axis) + wall - means[k][q::STRESS + 3 * axis + 2]
             };
             any_wall |= at(field::WALL + 2) != 0.0;
             check.normal_relative = check.normal_relative.max(residual(2).abs() / whole);
             check.downslope_relative = check.downslope_relative.max(residual(0).abs() / whole);
-            let momentum = |axis: usize| {
-                gravity[axis] * mass_above - momentum_rate_above(axis, k) / floor_area
-            };
             asked[k] = (!any_wall && momentum(2) < 0.0).then(|| momentum(0).abs() / -momentum(2));
             let weight = -gravity[2] * mass_above;
             if !any_wall && weight > 0.1 * whole && weight > 0.0 {

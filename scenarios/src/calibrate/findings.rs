@@ -8,6 +8,7 @@ use crate::state_hash;
 use crate::summary::{Quantity, Summary};
 use crate::table::Table;
 use colluvium_coupling::calibration::thesis::{Estimator, published_row};
+use colluvium_coupling::calibration::{LeftOut, Stress};
 use colluvium_coupling::campaign::Threshold;
 use colluvium_coupling::incline::{InclineResult, Outcome, Purpose, Start};
 
@@ -134,10 +135,38 @@ pub(super) fn summarise(scene: &Scene, record: &Campaign) -> Summary {
             let name = format!("velocity_against_grains_{}_{fit}", c.slope_degrees);
             let words = if within { "inside" } else { "outside" };
             let source = format!(
-                "continuum over grains less 1; the grains lie {words} 95 % of the posterior"
+                "continuum over grains less 1, above the foot of the bulk; the grains lie {words} 95 % of posterior and discrepancy"
             );
             summary.put(&name, Quantity::new(difference, "1").against(0.0, &source));
         }
+    }
+    for (name, stress) in [("p", Stress::MeanPressure), ("zz", Stress::NormalPressure)] {
+        let rows: Vec<_> = result
+            .left_out
+            .iter()
+            .filter(|r| r.stress == stress)
+            .collect();
+        if rows.is_empty() {
+            continue;
+        }
+        let share = |of: &dyn Fn(&LeftOut) -> bool| {
+            rows.iter().filter(|r| of(r)).count() as f64 / rows.len() as f64
+        };
+        let source = "share of flows left out of the fit within 95 % of posterior and discrepancy";
+        summary.put(
+            &format!("left_out_covered_{name}"),
+            Quantity::new(share(&|r| r.covered()[1]), "1").from(source),
+        );
+        let source = "the same by the posterior alone";
+        summary.put(
+            &format!("left_out_covered_by_posterior_{name}"),
+            Quantity::new(share(&|r| r.covered_by_posterior()[1]), "1").from(source),
+        );
+        let source = "the same of the law with 5 % more friction, the control";
+        summary.put(
+            &format!("left_out_covered_control_{name}"),
+            Quantity::new(share(&|r| r.control_covered()[1]), "1").from(source),
+        );
     }
     if let Some(fit) = &result.fit {
         summary.put(

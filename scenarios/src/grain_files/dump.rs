@@ -250,8 +250,8 @@ fn links(table: &Table, unsaid: &Unsaid) -> Result<Vec<Link>, String> {
                 ids: [at(0) as i64, at(1) as i64],
                 force: Vector3::new(at(2), at(3), at(4)),
                 torques: (columns.len() == 8).then(|| {
-                    // What files call the torque of a contact acts on the first grain; spheres of one law share it
-                    // alike by their radii, which is not known here: the second feels the same.
+                    // What files call the torque of a contact acts on the first grain; that on the second goes by the
+                    // arms, which are not known here.
                     let torque = Vector3::new(at(5), at(6), at(7));
                     [torque, torque]
                 }),

@@ -246,3 +246,96 @@ fn forces_of_lammps_are_whole_with_their_tangential_columns() {
     let bare = virial(&layer("c_pp[1],c_pp[2],c_pl[2],c_pl[3],c_pl[4]")[0]);
     assert!((bare[(0, 0)].abs() - xx.abs()).abs() > 0.1);
 }
+
+/// A bed of 150 grains of two sizes, 5 d deep, that LIGGGHTS-PUBLIC 3.8.0 settled on a plane wall (`liggghts/deck.in`);
+/// its local dump has no contacts with the wall.
+fn settled(columns: &str) -> Result<Vec<Snapshot>, Failure> {
+    let folder = tempfile::tempdir().unwrap();
+    let (grains, local) = (folder.path().join("a.dump"), folder.path().join("c.dump"));
+    std::fs::write(&grains, include_str!("liggghts/grains.dump")).unwrap();
+    std::fs::write(&local, include_str!("liggghts/contacts.dump")).unwrap();
+    let columns = columns.split(',').filter(|c| !c.is_empty());
+    let unsaid = Unsaid {
+        contacts: Some(local),
+        contact_columns: columns.map(|n| format!("c_pairs[{n}]")).collect(),
+        gravity: [0.0, 0.0, -9.81],
+        ..Unsaid::default()
+    };
+    all(&grains, &unsaid)
+}
+
+const LIGGGHTS_COLUMNS: &str = "1,2,4,5,6,7,8,9";
+
+#[test]
+fn a_bed_of_liggghts_has_its_mass_and_carries_its_weight() {
+    use colluvium_coupling::coarse_graining::{Averager, Layering, Lucy};
+    let [s] = &settled(LIGGGHTS_COLUMNS).unwrap()[..] else {
+        panic!("one instant")
+    };
+    assert_eq!((s.grains.len(), s.contacts.len()), (150, 361));
+    let (d, area) = (0.01, 0.05 * 0.05);
+    let layers = Layering {
+        lower: -2.0 * d,
+        thickness: 0.5 * d,
+        count: 30,
+    };
+    let mut averager = Averager::new(Lucy { half_width: d }, layers).unwrap();
+    averager.sample(s);
+    let profile = averager.profile(d, 2500.0);
+    let mass: f64 = s.grains.iter().map(|g| g.mass).sum();
+    let found: f64 = profile.rows.iter().map(|r| r.density.value).sum();
+    assert!((found * profile.layer * area / mass - 1.0).abs() < 1e-12);
+    let solid: f64 = profile.rows.iter().map(|r| r.phi.value).sum();
+    // Seven digits of radii, nine of masses.
+    assert!((solid * profile.layer * area * 2500.0 / mass - 1.0).abs() < 1e-6);
+    let weight_at = |s: &[f64]| 9.81 * profile.layer * (s[1..].iter().sum::<f64>() + 0.5 * s[0]);
+    let densities: Vec<f64> = profile.rows.iter().map(|r| r.density.value).collect();
+    let mut layers_seen = 0;
+    // A kernel and a grain away from the wall, and where something is to be carried.
+    for (k, row) in profile.rows.iter().enumerate() {
+        let weight = weight_at(&densities[k..]);
+        if row.z > 1.6 * d && weight > 60.0 {
+            let off = row.sigma_zz.value / weight - 1.0;
+            println!(
+                "z {:.4} m: σ_zz {:.2} Pa, weight {weight:.2} Pa",
+                row.z, row.sigma_zz.value
+            );
+            // Half a layer of 5 mm is 0.4 % of what 12 layers carry.
+            assert!(off.abs() < 0.02, "{off} at {}", row.z);
+            layers_seen += 1;
+        }
+    }
+    assert!(layers_seen >= 4, "{layers_seen}");
+    // Taken as they come, the third column, whether a pair reaches over the edge, would be a force: refused.
+    let why = settled("").unwrap_err().to_string();
+    assert!(why.contains("--contact-columns"), "{why}");
+}
+
+/// Grains of two sizes at rest: what turns the smaller of a pair is not what turns the larger.
+#[test]
+fn torques_of_liggghts_are_in_balance_on_both_sides() {
+    let [s] = &settled(LIGGGHTS_COLUMNS).unwrap()[..] else {
+        panic!("one instant")
+    };
+    let mut turned = vec![[Vector3::<f64>::zeros(); 2]; s.grains.len()];
+    let mut typical = 0.0f64;
+    for c in &s.contacts {
+        let Partner::Grain(partner) = c.partner else {
+            panic!("no walls here")
+        };
+        turned[c.grain][0] += c.torque;
+        turned[partner][0] += c.partner_torque;
+        // The control: the same torque on both.
+        turned[c.grain][1] += c.torque;
+        turned[partner][1] += c.torque;
+        typical = typical.max(c.torque.norm());
+    }
+    let free = s.grains.iter().zip(&turned);
+    let inside = free.filter(|(g, _)| g.position.z > 0.008);
+    let worst = inside.fold([0.0f64; 2], |worst, (_, sums)| {
+        [0, 1].map(|k| worst[k].max(sums[k].norm()))
+    });
+    println!("largest sum of torques {worst:?} of {typical:e}");
+    assert!(worst[0] < 0.01 * typical, "{worst:?} {typical}");
+    assert!(worst[1] > 0.1 * typical, "{worst:?} {typical}");
+}

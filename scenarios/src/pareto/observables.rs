@@ -57,19 +57,29 @@ pub fn errors(scene: &Scene, run: &Path, reference: &Path) -> Result<Errors, Fai
     })
 }
 
+/// Errors that are told beside the others: a fit may move μ_s, μ_2 and I_0 along a line on which μ(I) hardly changes.
+pub const TOLD: [&str; 3] = ["mu_s", "mu_2", "i_0"];
+
 /// Relative errors of a campaign against another: of the fitted friction, largest over the inertial numbers that both
-/// measured, and of the slopes where flow stops and sets off. NaN where one has none.
+/// measured, of its parameters, and, where the reference sought them, of the slopes where flow stops and sets off. NaN where
+/// one has none.
 pub fn of_campaigns(run: &Path, reference: &Path) -> Result<Errors, Failure> {
     let laws = [run, reference].map(|path| RheologyFile::read(&path.join(RHEOLOGY)).ok());
     let friction = match &laws {
         [Some(ours), Some(theirs)] => friction_error(ours, theirs),
         _ => f64::NAN,
     };
-    Ok(vec![
-        ("friction".to_owned(), friction),
-        ("stop".to_owned(), result(run, reference, "stop")?),
-        ("onset".to_owned(), result(run, reference, "onset")?),
-    ])
+    let mut errors = vec![("friction".to_owned(), friction)];
+    for name in TOLD {
+        errors.push((name.to_owned(), result(run, reference, name)?));
+    }
+    let sought = report::read_summary(reference)?.results;
+    for name in ["stop", "onset"] {
+        if sought.contains_key(name) {
+            errors.push((name.to_owned(), result(run, reference, name)?));
+        }
+    }
+    Ok(errors)
 }
 
 fn friction_error(ours: &RheologyFile, theirs: &RheologyFile) -> f64 {

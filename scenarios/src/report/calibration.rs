@@ -56,20 +56,35 @@ pub struct Comparison {
     pub p: Vec<f64>,
     /// Exact velocity (m/s).
     pub exact_u: Vec<f64>,
-    /// Quantiles 0.025, 0.16, 0.5, 0.84 and 0.975 of the velocity over that of the best law, from the posterior.
+    /// Quantiles 0.025, 0.16, 0.5, 0.84 and 0.975 of the velocity over that of the best law, from the posterior and from
+    /// how far flows lie off the law.
     #[serde(default)]
     pub band: Option<[f64; 5]>,
     /// The grains' velocity, mean over the height of their flow (m/s).
     #[serde(default)]
     pub grains_u: Option<f64>,
+    /// The stress ratio that momentum asks of the grains' bulk: tan θ, less what accelerates them.
+    #[serde(default)]
+    pub tangent: Option<f64>,
+    /// Mean velocity of the bulk above that of its foot, by the continuum and by the grains (m/s).
+    #[serde(default)]
+    pub gains: Option<[f64; 2]>,
+    /// The continuum over the grains, less 1, with one cause after another taken out.
+    #[serde(default)]
+    pub causes: Vec<(String, f64)>,
 }
 
 impl Comparison {
-    /// The continuum's mean velocity over the grains', less 1; and whether the grains' lies within 68 and 95 % of the
-    /// posterior.
+    /// The continuum's velocity over the grains', less 1, above the foot of the bulk where that is known; and whether the
+    /// grains' lies within 68 and 95 % of what posterior and discrepancy allow.
     pub fn against_grains(&self) -> Option<(f64, [bool; 2])> {
-        let grains = self.grains_u?;
-        let mean = self.u.iter().sum::<f64>() / self.u.len().max(1) as f64;
+        let [mean, grains] = match self.gains {
+            Some(gains) => gains,
+            None => [
+                self.u.iter().sum::<f64>() / self.u.len().max(1) as f64,
+                self.grains_u?,
+            ],
+        };
         if !(grains > 0.0 && mean > 0.0) {
             return None;
         }

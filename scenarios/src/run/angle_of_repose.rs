@@ -35,7 +35,7 @@ const SETTLING: f64 = 8.0;
 
 /// Angles of repose (degrees) by μ_R and β with μ_s = 1 and μ_T = 1.3: F. Thuillet, PhD thesis, Université
 /// Côte d'Azur 2019, Table 2.2, from avalanches of Y. Zhang.
-const TABLE: [[f64; 3]; 7] = [
+pub const PUBLISHED_ANGLES: [[f64; 3]; 7] = [
     [1.05, 0.1, 25.0],
     [1.05, 0.2, 28.0],
     [1.05, 0.3, 31.0],
@@ -54,7 +54,7 @@ fn published(law: &ContactLaw) -> Option<f64> {
         return None;
     };
     let near = |a: f64, b: f64| (a - b).abs() < 1e-9;
-    TABLE
+    PUBLISHED_ANGLES
         .iter()
         .find(|[rolling, beta, _]| {
             near(shape.rolling_friction, *rolling)

@@ -44,13 +44,30 @@ pub enum FrictionLaw {
     Table,
 }
 
-/// A material, by numbers or from a file that `calibrate` wrote.
+/// Where on a map of materials a law is taken from; nothing outside the map is.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct MapPlaceKeys {
+    /// Shape parameter β of the contact law.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 5.0))]
+    pub beta: f64,
+    /// Rolling friction μ_R of the contact law.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0))]
+    pub mu_r: f64,
+    /// A `map.toml` that `colluvium map` wrote.
+    pub map: String,
+}
+
+/// A material, by numbers, from a file that `calibrate` wrote or from a map.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct RheologyKeys {
     /// A `rheology.toml`; its numbers take the place of the keys below.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub file: Option<String>,
+    /// A place on a measured map of materials; the law there takes the place of the keys below.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub from: Option<MapPlaceKeys>,
     /// The law of friction; it decides which of the numbers below are read.
     #[serde(default)]
     pub law: FrictionLaw,

@@ -198,6 +198,9 @@ pub struct CalibrationKeys {
     #[serde(default)]
     #[schemars(extend("minItems" = 0, "maxItems" = 20, "items" = {"type": "number", "minimum": 0.05, "maximum": 4.0}))]
     pub depths: Vec<f64>,
+    /// Whether stop and onset are sought; false: flows alone are measured.
+    #[serde(default = "yes")]
+    pub search: bool,
     /// Where a flowing bed stops, bracketed from flow.
     pub stop: Bracket,
     /// Where a bed at rest starts to flow, bracketed from rest.
@@ -219,6 +222,10 @@ pub struct CalibrationKeys {
     /// Cells across the depth in that comparison.
     #[schemars(extend("minimum" = 8, "maximum" = 1024))]
     pub compare_cells: u64,
+}
+
+fn yes() -> bool {
+    true
 }
 
 fn one() -> u64 {

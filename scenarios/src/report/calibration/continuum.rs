@@ -3,6 +3,7 @@
 use super::super::page::{figure, number};
 use super::super::plot::{Mark, Plot};
 use super::{Campaign, FrictionOf, HEIGHT, WIDTH, outcome};
+use colluvium_coupling::calibration::{CONTROL, Stress};
 use colluvium_coupling::incline::InclineResult;
 use maud::{Markup, html};
 
@@ -21,37 +22,118 @@ pub(super) fn continuum(campaign: &Campaign) -> Markup {
         @if !flows.is_empty() {
             h2 { "Grains, continuum, theory" }
             p {
-                "The fitted law in the finite-volume solver, at the slope and depth of the grains, from rest to steady flow. "
-                "On an incline its single pressure is σ_zz and its friction is tan θ; the grains' p = trace/3 is smaller than σ_zz. "
-                "So the fit of |τ|/σ_zz is the one that should reproduce the velocity here, and the gap to the fit of |τ|/p "
-                "shows what the normal-stress difference costs a scalar law."
+                "The fitted law in the finite-volume solver, at the weight of the grains and at the stress ratio that momentum asks of "
+                "their bulk: tan θ, less what accelerates them. Velocities are compared above the foot of the bulk, so that slip and "
+                "the layers at the base are the grains' own. On an incline the solver's single pressure is σ_zz and its friction "
+                "|τ|/σ_zz; the grains' p = trace/3 is smaller. So the fit of |τ|/σ_zz is the one that should reproduce the velocity, "
+                "and the fit of |τ|/p is the control that should not."
             }
             div.figures {
                 @for run in &flows { (velocity(campaign, run)) (pressure(campaign, run)) }
             }
             div.wide { table {
                 tr {
-                    th { "slope" } th.text { "law" } th { "I" } th { "mean u [m/s]" } th { "grains' mean u [m/s]" }
-                    th { "difference" } th { "posterior, 95 %" } th { "grains within" } th { "error against exact" } th { "wall [s]" }
+                    th { "slope" } th.text { "law" } th { "τ/σ_zz" } th { "I" } th { "u above foot [m/s]" } th { "grains [m/s]" }
+                    th { "difference" } th { "posterior and discrepancy, 95 %" } th { "grains within" } th { "error against exact" } th { "wall [s]" }
                 }
                 @for c in &campaign.comparisons {
-                    @let grains = c.grains_u.or_else(|| flows.iter().find(|r| r.slope_degrees == c.slope_degrees).map(|r| r.steady.mean));
-                    @let mean = c.u.iter().sum::<f64>() / c.u.len().max(1) as f64;
+                    @let against = c.against_grains();
                     tr {
                         td { (c.slope_degrees) "°" }
                         td.text { (friction_name(c.friction)) }
+                        td { @if let Some(t) = c.tangent { (format!("{t:.4}")) } }
                         td { (number(c.inertial_number)) @if !c.inside_valid_i { " " span.tag.bad { "not measured" } } }
-                        td { (number(mean)) }
-                        td { @if let Some(g) = grains { (number(g)) } }
-                        td { @if let Some(g) = grains { (format!("{:+.1} %", 100.0 * (mean / g - 1.0))) } }
-                        td { @if let Some(b) = c.band { (format!("{:+.0} … {:+.0} %", 100.0 * (b[0] - 1.0), 100.0 * (b[4] - 1.0))) } }
-                        td { @match c.against_grains() { Some((_, [true, _])) => "68 %", Some((_, [_, true])) => "95 %", Some(_) => "outside", None => "–" } }
+                        td { @if let Some([ours, _]) = c.gains { (number(ours)) } }
+                        td { @if let Some([_, grains]) = c.gains { (number(grains)) } }
+                        td { @if let Some((difference, _)) = against { (format!("{:+.1} %", 100.0 * difference)) } }
+                        td { @if let Some(b) = c.band { (percent(b[0])) " … " (percent(b[4])) } }
+                        td { @match against { Some((_, [true, _])) => "68 %", Some((_, [_, true])) => "95 %", Some(_) => "outside", None => "–" } }
                         td { (number(c.velocity_error)) }
                         td { (number(c.wall_s)) }
                     }
                 }
             } }
+            (causes(campaign))
         }
+        (left_out(campaign))
+    }
+}
+
+/// A factor as a change in per cent; a flow that nothing holds back has no number.
+fn percent(factor: f64) -> String {
+    if factor < 1e3 {
+        format!("{:+.1} %", 100.0 * (factor - 1.0))
+    } else {
+        "∞".to_owned()
+    }
+}
+
+/// Continuum over grains, less 1, one cause after another.
+fn causes(campaign: &Campaign) -> Markup {
+    let told: Vec<_> = campaign
+        .comparisons
+        .iter()
+        .filter(|c| c.friction == FrictionOf::NormalStress && !c.causes.is_empty())
+        .collect();
+    html! {
+        @if let Some(first) = told.first() {
+            h3 { "What makes the difference" }
+            p { "The continuum's velocity over the grains', less 1, law of |τ|/σ_zz, with one cause after another taken out." }
+            div.wide { table {
+                tr { th.text { "" } @for c in &told { th { (c.slope_degrees) "°" } } }
+                @for (k, (name, _)) in first.causes.iter().enumerate() {
+                    tr {
+                        td.text { (name) }
+                        @for c in &told { td { @if let Some((_, d)) = c.causes.get(k) { (percent(1.0 + d)) } } }
+                    }
+                }
+            } }
+        }
+    }
+}
+
+/// Every flow beside the law of the others.
+fn left_out(campaign: &Campaign) -> Markup {
+    let rows = &campaign.result.left_out;
+    html! {
+        @if !rows.is_empty() {
+            h3 { "Flows left out of the fit" }
+            p {
+                "Each flow beside the law that the others give: velocity above the foot of the bulk over the grains', from the stress "
+                "that momentum asks. The band holds the posterior and the discrepancy, by which flows lie off the law beyond what its "
+                "three parameters take up. The control is the same law with " (format!("{:.0}", 100.0 * CONTROL)) " % more friction."
+            }
+            div.wide { table {
+                tr {
+                    th { "slope" } th.text { "law" } th { "μ asked" } th { "law/grains − 1" } th { "posterior, 95 %" } th { "within" }
+                    th { "discrepancy in μ" } th { "with it, 68 %" } th { "95 %" } th { "within" } th { "control" } th { "within" }
+                }
+                @for r in rows {
+                    tr {
+                        td { (r.slope_degrees) "°" @if !r.inside { " " span.tag.bad { "beyond the others" } } }
+                        td.text { (friction_name(if r.stress == Stress::MeanPressure { FrictionOf::Pressure } else { FrictionOf::NormalStress })) }
+                        td { (format!("{:.4}", r.asked)) }
+                        td { (percent(r.ratio)) }
+                        td { (percent(r.by_posterior[0])) " … " (percent(r.by_posterior[4])) }
+                        td { (within(r.covered_by_posterior())) }
+                        td { (format!("{:.4}", r.discrepancy.friction)) }
+                        td { (percent(r.band[1])) " … " (percent(r.band[3])) }
+                        td { (percent(r.band[0])) " … " (percent(r.band[4])) }
+                        td { (within(r.covered())) }
+                        td { (percent(r.control)) }
+                        td { (within(r.control_covered())) }
+                    }
+                }
+            } }
+        }
+    }
+}
+
+fn within(covered: [bool; 2]) -> &'static str {
+    match covered {
+        [true, _] => "68 %",
+        [_, true] => "95 %",
+        _ => "outside",
     }
 }
 
