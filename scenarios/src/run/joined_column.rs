@@ -191,7 +191,7 @@ impl<'a> JoinedColumn<'a> {
         let solid = |radius: f64| 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
         let mut grains: Vec<(u32, [f64; 2])> = simulation
             .held(|x| f(x.y))
-            .filter(|g| live.edge.counts(g.id))
+            .filter(|g| live.edge.counts(g))
             .map(|g| (g.id, [g.position.x, solid(g.radius)]))
             .collect();
         grains.sort_unstable_by_key(|(id, _)| *id);
@@ -367,8 +367,12 @@ impl Recipe for JoinedColumn<'_> {
         .to_vec()
     }
 
-    fn look(&self, _: &mut Simulation, _: &Snapshot, _: &[f64]) -> Vec<f64> {
-        let guard = self.live();
+    fn look(&self, simulation: &mut Simulation, _: &Snapshot, state: &[f64]) -> Vec<f64> {
+        let mut guard = self.live();
+        // A row may come before the first loads after a restart.
+        if guard.is_none() && !state.is_empty() {
+            *guard = self.recalled(simulation, state).ok();
+        }
         let Some(live) = guard.as_ref() else {
             return vec![f64::NAN; 5];
         };

@@ -62,16 +62,17 @@ pub struct ColumnOverlapKeys {
 }
 
 impl ColumnOverlapKeys {
-    /// The settings, for grains of this mean diameter (m).
-    fn settings(&self, diameter: f64) -> OverlapSettings {
+    /// The settings, for grains of this mean diameter (m) and this √(d/g) (s).
+    fn settings(&self, diameter: f64, time: f64) -> OverlapSettings {
+        let soon = Some(TOGETHER * time);
         let length = |diameters: Option<f64>| diameters.map(|n| n * diameter);
         OverlapSettings {
             inner: length(self.inner_diameters),
             buffer: length(self.buffer_diameters),
             shell: length(self.shell_diameters),
             stress_time: self.stress_time,
-            relaxation_time: self.relaxation_time,
-            following_time: self.following_time,
+            relaxation_time: self.relaxation_time.or(soon),
+            following_time: self.following_time.or(soon),
             exchange_time: self.exchange_time,
             load_time: self.load_time,
             impedance: self.impedance,
@@ -82,6 +83,9 @@ impl ColumnOverlapKeys {
     }
 }
 
+/// Relaxation and following times over √(d/g): with 1 of it, as on an incline, the continuum behind a heap that has
+/// come to rest goes on creeping past its grains.
+const TOGETHER: f64 = 0.2;
 /// Solid fraction of a settled column, before it is there to be measured.
 pub const DENSE: f64 = 0.57;
 /// Column heights in front of the foot's end that begin to flow: a collapse fails along a plane from there, which
@@ -119,7 +123,10 @@ impl CollapseScene {
                 .stiffness
                 .unwrap_or(grains.stiffness_scaled * mass * self.gravity / d),
         };
-        let settings = self.overlap.settings(d).resolve(&scales, false);
+        let settings = self
+            .overlap
+            .settings(d, scales.time)
+            .resolve(&scales, false);
         settings.map_err(|error| match error {
             OverlapError::OutOfRange {
                 key,

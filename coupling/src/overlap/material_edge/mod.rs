@@ -3,8 +3,8 @@
 //! At the start the edge is the vertical plane x = x_b. Grains lie beyond it; the continuum reaches from the wall at
 //! x = 0 to x_a, inside the grains. Each grain keeps the label ξ = x − x_b that it had at the start: labels say where
 //! in the overlap it is, however the material has deformed, and nothing ever crosses the edge. From the edge into the
-//! grains: *shell* ξ < b, *buffer* ξ < ξ_m, *inner overlap* ξ_m < ξ < ξ_a; totals count grains of ξ > ξ_m and the
-//! continuum behind them. What is exchanged is what a flat edge exchanges (see [`super`]), cell by cell:
+//! grains: *shell* ξ < b, *buffer* ξ < ξ_m, *inner overlap* ξ_m < ξ < ξ_a; totals count grains in front of the surface to
+//! which those of ξ = ξ_m have moved, the *handshake surface*, and the continuum behind it. What is exchanged is what a flat edge exchanges (see [`super`]), cell by cell:
 //!
 //! - *on the continuum*: its surface inside the grains bears their mean pressure, and from ξ_m to ξ_a its deviatoric
 //!   stress is w σ_grains + (1 − w) σ_continuum, w = (ξ̄ − ξ_m)/(ξ_a − ξ_m) from the mean label ξ̄ of a cell's grains
@@ -251,11 +251,12 @@ impl MaterialEdge {
         label_of(&self.labels, grain)
     }
 
-    /// Whether totals count a grain of this number.
-    pub fn counts(&self, id: u32) -> bool {
-        self.labels
-            .get(id as usize)
-            .is_some_and(|label| *label > self.spec.settings.buffer && *label < NO_LABEL)
+    /// Whether totals count a grain: it lies in front of the handshake surface, whose other side they count as
+    /// continuum. By its label it would be counted where the continuum is too, once labels have mixed.
+    pub fn counts(&self, grain: &GrainSample) -> bool {
+        let row = (grain.position.z / self.cells.spacing).max(0.0) as usize;
+        let row = row.min(self.held.handshake.len() - 1);
+        self.label(grain).is_some() && grain.position.x >= self.held.handshake[row]
     }
 
     /// The continuum.

@@ -16,7 +16,7 @@ impl MaterialEdge {
     pub fn mass_error(&self, simulation: &Simulation) -> f64 {
         let mut masses: Vec<(u32, f64)> = simulation
             .held(|_| true)
-            .filter(|g| self.counts(g.id))
+            .filter(|g| self.counts(g))
             .map(|g| (g.id, g.mass))
             .collect();
         masses.sort_unstable_by_key(|m| m.0);
