@@ -143,7 +143,7 @@ fn near(beta: f64, mu_r: f64) -> f64 {
         -1.5 * (1.05 / mu_r).ln() / 2.1f64.ln()
     };
     (low + (high - low) * share + rolling)
-        .round()
+        .round_ties_even()
         .clamp(10.0, 50.0)
 }
 

@@ -300,7 +300,7 @@ fn on_map(place: &Table) -> Result<(RheologyFile, Option<PathBuf>, String), Scen
     let told = told.unwrap_or_default();
     let with = |value: f64, error: Option<f64>| format!("{value:.3} ± {:.3}", error.unwrap_or(0.0));
     let source = format!(
-        "{told}: mu_s {}, mu_2 {}, I_0 {}, interpolation included",
+        "{told}: mu_s {}, mu_2 {}, I_0 {}",
         with(law.mu_s, law.mu_s_error),
         with(law.mu_2, law.mu_2_error),
         with(law.i_0, law.i_0_error)

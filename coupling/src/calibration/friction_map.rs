@@ -62,6 +62,8 @@ pub struct FrictionMap {
     mu_rs: Vec<f64>,
     /// By β, then μ_R.
     cells: Vec<MapCell>,
+    /// The least that the interpolation's error is taken for.
+    told: InterpolationError,
 }
 
 /// What a map says at a point.
@@ -300,7 +302,16 @@ impl FrictionMap {
             betas,
             mu_rs,
             cells: ordered,
+            told: InterpolationError::default(),
         })
+    }
+
+    /// The map with an error of its interpolation that is known otherwise, from campaigns off the grid: a grid of two by two
+    /// cannot tell its own. The larger of both counts.
+    #[must_use]
+    pub fn with_error(mut self, told: InterpolationError) -> Self {
+        self.told = told;
+        self
     }
 
     /// The cells, by rising β, then μ_R.
@@ -393,17 +404,19 @@ impl FrictionMap {
         all
     }
 
-    /// Root-mean-squares of [`FrictionMap::missed`]; 0 on a grid of two by two, which cannot tell.
+    /// Root-mean-squares of [`FrictionMap::missed`], or what was told where that is larger; 0 on a grid of two by two of
+    /// which nothing was told.
     pub fn error(&self) -> InterpolationError {
         let missed = self.missed();
         let rms = |of: &dyn Fn(&Missed) -> f64| {
             let squares: f64 = missed.iter().map(|m| of(m).powi(2)).sum();
             (squares / missed.len().max(1) as f64).sqrt()
         };
+        let told = &self.told;
         InterpolationError {
-            friction: std::array::from_fn(|k| rms(&|m| m.friction[k])),
-            repose: rms(&|m| m.repose),
-            solid_fraction: rms(&|m| m.solid_fraction),
+            friction: std::array::from_fn(|k| rms(&|m| m.friction[k]).max(told.friction[k])),
+            repose: rms(&|m| m.repose).max(told.repose),
+            solid_fraction: rms(&|m| m.solid_fraction).max(told.solid_fraction),
         }
     }
 }
@@ -599,6 +612,15 @@ mod tests {
         assert!(
             (error.friction[0] - 0.03 * (2.0f64 / 6.0).sqrt()).abs() < 1e-12,
             "{error:?}"
+        );
+        let told = InterpolationError {
+            friction: [0.05, 0.0, 0.0],
+            ..InterpolationError::default()
+        };
+        let warned = bent.clone().with_error(told).error();
+        assert_eq!(
+            warned.friction,
+            [0.05, error.friction[1], error.friction[2]]
         );
         let (before, after) = (map.at(0.2, 0.8).unwrap(), bent.at(0.2, 0.8).unwrap());
         assert!(after.covariance[0][0] > 4.0 * before.covariance[0][0]);

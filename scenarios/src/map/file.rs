@@ -20,7 +20,8 @@ pub struct MapFile {
     pub version: String,
     /// How it was measured.
     pub measured: String,
-    /// What leaving grid points out misses, root mean square; a result, not read.
+    /// What the interpolation misses, root mean square: grid points left out, or campaigns off the grid. The larger of this
+    /// and of what the cells tell counts.
     pub interpolation_error: InterpolationError,
     /// The campaigns.
     pub cell: Vec<MapCell>,
@@ -40,19 +41,28 @@ impl MapFile {
 
     /// The map itself.
     pub fn map(&self) -> Result<FrictionMap, MapError> {
-        FrictionMap::new(self.inertial_numbers, self.cell.clone())
+        let map = FrictionMap::new(self.inertial_numbers, self.cell.clone())?;
+        Ok(map.with_error(self.interpolation_error))
     }
 
     /// The law at a place, as a rheology with errors.
     pub fn rheology(&self, beta: f64, mu_r: f64) -> Result<RheologyFile, MapError> {
-        let found = self.map()?.at(beta, mu_r)?;
+        let map = self.map()?;
+        let found = map.at(beta, mu_r)?;
+        let unknown = map.error().friction == [0.0; 3];
         let error = |c: &[[f64; 3]; 3], k: usize| c[k][k].max(0.0).sqrt();
         let [mu_s, mu_2, i_0] = found.law;
         let known = |value: f64, error: f64| error < 0.5 * value.abs();
         let identified = (0..3).all(|k| known(found.law[k], error(&found.covariance, k)));
         let source = format!(
-            "the map at beta = {beta}, mu_r = {mu_r}; angle of repose {:.1} ± {:.1} degrees",
-            found.repose.value, found.repose.error
+            "the map at beta = {beta}, mu_r = {mu_r}{}; angle of repose {:.1} ± {:.1} degrees",
+            if unknown {
+                " (error of the interpolation not known)"
+            } else {
+                ""
+            },
+            found.repose.value,
+            found.repose.error
         );
         Ok(RheologyFile {
             mu_s,
@@ -203,6 +213,29 @@ mod tests {
         assert!(why.contains("rheology.from"), "{why}");
         let why = refused(&["rheology.from={beta=0.3, mu_R=1.0}".to_owned()]);
         assert!(why.contains("mu_R") || why.contains("mu_r"), "{why}");
+    }
+
+    /// The map in `rheologies/`: sound, and near the campaigns of other beds that are no part of it.
+    #[test]
+    fn the_measured_map_is_near_campaigns_that_are_no_part_of_it() {
+        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("rheologies/map.toml");
+        let file = MapFile::read(&path).unwrap();
+        assert!(file.interpolation_error.friction.iter().all(|e| *e > 0.0));
+        for cell in &file.cell {
+            assert_eq!(file.rheology(cell.beta, cell.mu_r).unwrap().check(), Ok(()));
+        }
+        let moderate = RheologyFile::read(Path::new("moderate")).unwrap();
+        let law = file.rheology(0.2, 1.05).unwrap();
+        for (i, error) in file
+            .inertial_numbers
+            .iter()
+            .zip(file.interpolation_error.friction)
+        {
+            let friction = |f: &RheologyFile| mu_of_i(f.mu_s, f.mu_2, f.i_0, *i);
+            let off = friction(&law) - friction(&moderate);
+            println!("β 0.2, μ_R 1.05, I {i}: map less campaign {off:+.4}, error told {error:.4}");
+            assert!(off.abs() < 2.5 * error, "{off} {error}");
+        }
     }
 
     #[test]

@@ -67,6 +67,7 @@ fn missed(map: &FrictionMap) -> Markup {
     let i = map.inertial_numbers();
     let error = map.error();
     html! {
+        @if map.missed().is_empty() { p { "No grid point has neighbours on both sides: a grid this small cannot tell the error of its interpolation." } }
         div.wide { table {
             tr {
                 th { "β" } th { "μ_R" }
