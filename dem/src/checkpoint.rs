@@ -124,6 +124,7 @@ impl Simulation {
         self.loads.record(&mut record);
         self.bonds.record(&mut record);
         self.bodies.record(&mut record);
+        self.clumps.record(&mut record);
         self.fields.record(&mut record);
         self.moving_box.record(&self.cell(), &mut record);
         self.drain.record(&mut record);
@@ -272,6 +273,8 @@ impl Simulation {
         self.fields.read(record)?;
         self.read_box(record)?;
         self.drain.read(record)?;
+        self.clumps
+            .read(record, &grains, &mut self.list, &self.domain)?;
         self.grains = grains;
         self.weigh();
 

@@ -316,7 +316,10 @@ impl Simulation {
         let mut velocity = vector(v);
         let mut turn = vector(s);
         let fixed = self.grains.is_fixed(i);
-        if !fixed {
+        if self.clumps.carry(i) {
+            let [mean, spin] = self.member_kicked(i, 0.5 * kick);
+            (velocity, turn) = (mean, spin * self.grains.place[i][3]);
+        } else if !fixed {
             let [force, torque, moment] = self.totals[i];
             velocity += 0.5 * kick * (vector(&force) * v[3] + self.gravity);
             turn += 0.5 * kick / SPHERE_INERTIA * v[3] * (vector(&torque) + vector(&moment) * s[3]);
@@ -339,15 +342,13 @@ impl Simulation {
         let moving: Vec<Moving> = (0..self.grains.len())
             .map(|i| self.moving(i, kick.abs()))
             .collect();
-        for (m, grain) in moving
-            .iter()
-            .enumerate()
-            .map(|(i, m)| (self.grains.mass[i], m))
-        {
-            if !grain.fixed {
+        for (i, grain) in moving.iter().enumerate() {
+            if self.moves_alone(i) {
+                let m = self.grains.mass[i];
                 ledger.gravity += kick * m * grain.velocity.dot(&self.gravity);
             }
         }
+        ledger.gravity += self.gravity_on_clumps(kick);
         let cell = self.cell();
         for (chunk, k) in self.reach.pairs() {
             let [i, j] = chunk.pair(k);

@@ -13,6 +13,7 @@ mod bonds;
 mod boundaries;
 mod checkpoint;
 mod chunk;
+mod clumps;
 pub mod contact;
 mod contacts;
 mod conversion;
@@ -54,6 +55,7 @@ pub use bonds::{
     BondCount, BondRule, BondState, BondStress, Cement, Cluster, Clusters, Section as BondSection,
 };
 pub use boundaries::{BoxMotion, Edge, Outflow, Outlet, StressServo};
+pub use clumps::{Clump, ClumpSample};
 pub use contact::{
     Cohesion, ContactLaw, Damping, Elasticity, Epsd, Hertz, Hooke, Jkr, LawTable, Laws, Lever,
     Mindlin, Normal, Rolling, ShapeParameter, SpringStiffness, Tangential, TangentialSpring,

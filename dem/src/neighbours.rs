@@ -9,6 +9,7 @@
 //! The list holds all pairs closer than `R_i + R_j + skin`, each once, i < j, ordered by i; it is valid
 //! as long as no two grains can have approached by more than the skin: see `validity.rs`.
 
+use crate::clumps::ALONE;
 use crate::domain::{Cell, Images};
 use crate::grains::Grains;
 use crate::grid::Grid;
@@ -61,6 +62,8 @@ pub(crate) struct Neighbours {
     pub allowance: Allowance,
     pub levels: Vec<Level>,
     pub watch: Watch,
+    /// Clump of each grain by number: pairs of one clump are left out. Empty where there are none.
+    pub clumps: Vec<u32>,
     build: Build,
 }
 
@@ -309,6 +312,7 @@ impl Neighbours {
             grains,
             images: Images::of(cell),
             skin,
+            clumps: &self.clumps,
         };
         let mut total = 0;
         for group in (0..rows).step_by(ROWS_A_PART * parts.len()) {
@@ -364,6 +368,7 @@ struct Finder<'a> {
     grains: &'a Grains,
     images: Images,
     skin: f64,
+    clumps: &'a [u32],
 }
 
 impl Finder<'_> {
@@ -458,10 +463,18 @@ impl Finder<'_> {
             let near = reach + xj[3];
             // Two fixed grains have nothing to say to each other.
             let idle = held && grains.motion[j as usize][3] == 0.0;
-            if r2 < near * near && !idle {
+            if r2 < near * near && !idle && !self.share_clump(i, j) {
                 partner.push(j);
             }
         }
+    }
+
+    /// Whether two grains belong to one clump.
+    #[inline(always)]
+    fn share_clump(&self, i: u32, j: u32) -> bool {
+        let clump = |row: u32| self.clumps.get(self.grains.id[row as usize] as usize);
+        !self.clumps.is_empty()
+            && clump(i).is_some_and(|&own| own != ALONE && clump(j) == Some(&own))
     }
 }
 

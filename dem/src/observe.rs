@@ -34,6 +34,9 @@ impl Simulation {
         let (inverse_mass, inverse_radius) = (v[3], s[3]);
         let mut velocity = vector(v);
         let mut turn = vector(s);
+        if self.clumps.carry(i) {
+            return self.member_kicked(i, self.half_step()).into();
+        }
         if self.steps_since_start > 0 && inverse_mass > 0.0 {
             let [force, torque, moment] = self.totals[i];
             let half = 0.5 * self.timestep;
@@ -129,7 +132,7 @@ impl Simulation {
     pub fn energy(&mut self) -> Energy {
         self.observe();
         let mut energy = Energy::default();
-        for i in (0..self.grains.len()).filter(|&i| !self.grains.is_fixed(i)) {
+        for i in (0..self.grains.len()).filter(|&i| self.moves_alone(i)) {
             let (v, w) = self.synchronised(i);
             let (m, r) = (self.grains.mass[i], self.grains.place[i][3]);
             energy.translation += 0.5 * m * v.norm_squared();
@@ -163,6 +166,9 @@ impl Simulation {
                 &contact.history[..width],
             );
         }
+        let [translation, rotation] = self.clump_kinetic();
+        energy.translation += translation;
+        energy.rotation += rotation;
         energy.bonds = self.bond_energy();
         energy.potential = self.fields.potential();
         self.add_body_energy(&mut energy);
@@ -213,11 +219,12 @@ impl Simulation {
 
     /// Momentum of the free grains and bodies at this instant (N s).
     pub fn momentum(&mut self) -> Vector3<f64> {
-        self.samples()
-            .iter()
-            .filter(|g| !g.fixed)
-            .map(|g| g.mass * g.velocity)
+        let samples = self.samples();
+        let alone = (0..samples.len()).filter(|&i| self.moves_alone(i));
+        alone
+            .map(|i| samples[i].mass * samples[i].velocity)
             .sum::<Vector3<f64>>()
+            + self.clump_momentum_now()
             + self.body_momentum_now()
     }
 
@@ -244,21 +251,21 @@ impl Simulation {
     /// `leapfrog_momentum(t) + wall_impulse(t)` changes by exactly the weight times time.
     pub fn leapfrog_momentum(&self) -> Vector3<f64> {
         let mut sum = Vector3::zeros();
-        for i in (0..self.grains.len()).filter(|&i| !self.grains.is_fixed(i)) {
+        for i in (0..self.grains.len()).filter(|&i| self.moves_alone(i)) {
             sum += self.grains.mass[i] * vector(&self.grains.motion[i]);
         }
-        sum + self.body_momentum().0
+        sum + self.clump_momentum().0 + self.body_momentum().0
     }
 
     /// How far the momentum of grains and walls is from that of the start plus gravity's, relative to
     /// the largest of the terms: round-off, unless a force had no counterforce.
     pub fn momentum_error(&mut self) -> f64 {
         let (held, taken) = (self.leapfrog_momentum(), self.wall_impulse());
-        let free = (0..self.grains.len()).filter(|&i| !self.grains.is_fixed(i));
+        let free = (0..self.grains.len()).filter(|&i| self.moves_alone(i));
         let size: f64 = free
             .map(|i| self.grains.mass[i] * vector(&self.grains.motion[i]).norm())
             .sum();
-        let size = size + self.body_momentum().1;
+        let size = size + self.clump_momentum().1 + self.body_momentum().1;
         let scale = size.max(taken.norm()).max(self.account.norm());
         if scale > 0.0 {
             (held + taken - self.account).norm() / scale
@@ -272,7 +279,7 @@ impl Simulation {
     /// it is conserved to round-off.
     pub fn leapfrog_angular_momentum(&self) -> Vector3<f64> {
         let mut sum = Vector3::zeros();
-        for i in (0..self.grains.len()).filter(|&i| !self.grains.is_fixed(i)) {
+        for i in (0..self.grains.len()).filter(|&i| self.moves_alone(i)) {
             let (x, v, turn) = (
                 vector(&self.grains.place[i]),
                 vector(&self.grains.motion[i]),
@@ -281,7 +288,7 @@ impl Simulation {
             let radius = self.grains.place[i][3];
             sum += self.grains.mass[i] * (x.cross(&v) + SPHERE_INERTIA * radius * turn);
         }
-        sum + self.body_angular_momentum()
+        sum + self.clump_angular_momentum() + self.body_angular_momentum()
     }
 
     /// Hash of the bits of all positions, velocities, spins and springs, in the grains' own order.
@@ -327,6 +334,7 @@ impl Simulation {
         }
         self.bonds.hash(&mut hash);
         self.bodies.hash(&mut hash);
+        self.clumps.hash(&mut hash);
         hash.finish()
     }
 }

@@ -58,9 +58,9 @@ impl Simulation {
         Ok(ids)
     }
 
-    /// Takes out all grains for which `f` says so, and says how many.
-    pub fn remove(&mut self, mut f: impl FnMut(&GrainSample) -> bool) -> usize {
-        let goes: Vec<bool> = self.samples().iter().map(&mut f).collect();
+    /// Takes out all grains for which `f` says so, with all others of their clumps, and says how many.
+    pub fn remove(&mut self, f: impl FnMut(&GrainSample) -> bool) -> usize {
+        let goes = self.marked(f);
         let count = goes.iter().filter(|&&goes| goes).count();
         if count == 0 {
             return 0;
@@ -69,6 +69,8 @@ impl Simulation {
         for i in (0..goes.len()).filter(|&i| goes[i]) {
             self.account -= self.held_momentum(i);
         }
+        let gone = self.drop_clumps(&goes);
+        self.account -= gone;
         let mut left = 0;
         let remaining = goes.iter().map(|&goes| {
             left += u32::from(!goes);
@@ -82,12 +84,12 @@ impl Simulation {
         count
     }
 
-    /// Momentum of a free grain as the integrator holds it.
+    /// Momentum of a free grain as the integrator holds it; that of a clump is none of its members'.
     pub(crate) fn held_momentum(&self, i: usize) -> Vector3<f64> {
-        if self.grains.is_fixed(i) {
-            Vector3::zeros()
-        } else {
+        if self.moves_alone(i) {
             self.grains.mass[i] * vector(&self.grains.motion[i])
+        } else {
+            Vector3::zeros()
         }
     }
 

@@ -9,6 +9,7 @@ pub(crate) use lists::Layout;
 use crate::bodies::Bodies;
 use crate::bonds::Bonds;
 use crate::boundaries::{Drain, MovingBox};
+use crate::clumps::Clumps;
 use crate::contact::composition::Visitor;
 use crate::contact::{Interaction, LawTable, Step};
 use crate::contacts::Touching;
@@ -59,7 +60,7 @@ pub struct Simulation {
     pub(crate) walls: Vec<Standing>,
     pub(crate) timestep: f64,
     pub(crate) parallel: bool,
-    team: OwnTeam,
+    pub(crate) team: OwnTeam,
     /// Registers that steps use; all give the same bits.
     pub(crate) width: Width,
     pub(crate) skin: f64,
@@ -72,6 +73,8 @@ pub struct Simulation {
     pub(crate) wall_contacts: WallContacts,
     /// Bodies; their parts stand behind the walls.
     pub(crate) bodies: Bodies,
+    /// Grains that move as one.
+    pub(crate) clumps: Clumps,
     pub(crate) loads: Loads,
     pub(crate) bonds: Bonds,
     pub(crate) fields: Gravity,
@@ -82,7 +85,7 @@ pub struct Simulation {
     /// Histories on their way to new lists.
     touching: Touching,
     /// For each row, the square of the largest speed against its drift (m²/s²).
-    fastest: Vec<f64>,
+    pub(crate) fastest: Vec<f64>,
     /// Fixed grains in order, and the momentum each has taken since it was last counted (N s).
     fixed: Vec<u32>,
     taken: Vec<[f64; 4]>,
@@ -144,6 +147,7 @@ impl Simulation {
             law: Arc::new(law),
             walls,
             bodies,
+            clumps: Clumps::default(),
             timestep: setup.timestep,
             parallel: setup.threads == Threads::Rayon,
             team: OwnTeam::default(),
@@ -360,6 +364,9 @@ impl Simulation {
         if !self.bodies.is_empty() {
             self.step_bodies(kick);
         }
+        if !self.clumps.is_empty() {
+            self.step_clumps(kick);
+        }
         self.account += kick * (self.weighed * self.gravity + self.loads.external);
         self.list.age += self.timestep;
         self.reach.age += self.timestep;
@@ -399,23 +406,29 @@ impl Simulation {
     pub fn give_velocity(&mut self, mut f: impl FnMut(&GrainSample) -> Vector3<f64>) {
         self.wrap_grains();
         let samples = self.samples();
+        let mut given = Vec::with_capacity(samples.len());
         for (i, sample) in samples.iter().enumerate() {
             if sample.fixed {
+                given.push(Vector3::zeros());
                 continue;
             }
             let (v, s) = (f(sample), sample.spin * sample.radius);
+            given.push(v);
             self.grains.motion[i][..3].copy_from_slice(v.as_slice());
             self.grains.turn[i][..3].copy_from_slice(s.as_slice());
         }
+        self.launch_clumps(&given);
         self.restart_motion();
     }
 
-    /// Holds still every free grain for which `f` says so; it becomes part of the walls.
+    /// Holds still every free grain for which `f` says so, with all others of its clump; it becomes part of the
+    /// walls.
     pub fn fix(&mut self, mut f: impl FnMut(&GrainSample) -> bool) {
-        let samples = self.samples();
+        let marks = self.marked(|sample| !sample.fixed && f(sample));
         let mut any = false;
-        for (i, sample) in samples.iter().enumerate() {
-            if !sample.fixed && f(sample) {
+        self.drop_clumps(&marks);
+        for (i, marked) in marks.into_iter().enumerate() {
+            if marked {
                 self.grains.motion[i] = [0.0; 4];
                 self.grains.turn[i][..3].fill(0.0);
                 any = true;

@@ -42,12 +42,21 @@ fn diagonal(x: f64, y: f64, z: f64) -> Matrix3<f64> {
 
 impl MassProperties {
     /// The same seen from where a pose puts it.
-    fn put(&self, pose: &Pose) -> MassProperties {
+    pub fn put(&self, pose: &Pose) -> MassProperties {
         let turn = pose.orientation.to_rotation_matrix();
         MassProperties {
             mass: self.mass,
             centre: pose.position + turn * self.centre,
             inertia: turn * self.inertia * turn.transpose(),
+        }
+    }
+
+    /// The same spread of another mass (kg).
+    pub fn scaled_to(&self, mass: f64) -> MassProperties {
+        MassProperties {
+            mass,
+            centre: self.centre,
+            inertia: self.inertia * (mass / self.mass),
         }
     }
 
@@ -118,7 +127,7 @@ impl MassProperties {
     }
 
     /// Checks that some distribution of mass has these numbers.
-    pub(super) fn validate(&self, key: &str) -> Result<(), SetupError> {
+    pub(crate) fn validate(&self, key: &str) -> Result<(), SetupError> {
         check(&format!("{key}.mass"), self.mass, "> 0 kg", |m| m > 0.0)?;
         for c in self.centre.iter() {
             check(&format!("{key}.centre"), *c, "finite, m", |_| true)?;

@@ -39,6 +39,8 @@ pub(crate) use contacts::Bodies;
 pub use mass::MassProperties;
 pub use sample::{BodyContactSample, BodyLoad, BodySample, Touched};
 pub(crate) use step_limits::feeling_parts;
+#[cfg(test)]
+pub(crate) use top::turn;
 
 use crate::setup::{SetupError, check, known_material};
 use crate::walls::{Mesh, Motion, Pose};
@@ -67,6 +69,18 @@ pub enum Solid {
     },
     /// What a closed mesh encloses, or an open one as a plate.
     Mesh(Arc<Mesh>),
+}
+
+impl Solid {
+    /// Distance of its farthest point from its origin (m).
+    pub fn extent(&self) -> f64 {
+        match self {
+            Solid::Sphere { radius } => *radius,
+            Solid::Cuboid { half_sides } => half_sides.norm(),
+            Solid::Frustum { radii, height } => radii[0].max(radii[1].hypot(*height)),
+            Solid::Mesh(mesh) => mesh.extent(),
+        }
+    }
 }
 
 /// A part of a body.
@@ -240,17 +254,15 @@ impl Body {
     /// # Errors
     /// If its parts have no mass properties.
     pub fn weighing(mut self, mass: f64) -> Result<Body, SetupError> {
-        let spread = self.mass_properties("body")?;
-        self.mass = Some(MassProperties {
-            mass,
-            centre: spread.centre,
-            inertia: spread.inertia * (mass / spread.mass),
-        });
+        self.mass = Some(self.mass_properties("body")?.scaled_to(mass));
         Ok(self)
     }
 
-    /// Checks its numbers; `key` says whose they are.
-    pub(crate) fn validate(&self, key: &str, materials: usize) -> Result<(), SetupError> {
+    /// Checks its numbers; `key` says whose they are. There are laws for so many materials.
+    ///
+    /// # Errors
+    /// If a number is outside its range, named with the key.
+    pub fn validate(&self, key: &str, materials: usize) -> Result<(), SetupError> {
         let parts = self.parts.len() as f64;
         check(&format!("{key}.parts, their number"), parts, "≥ 1", |n| {
             n >= 1.0

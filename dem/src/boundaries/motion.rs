@@ -302,6 +302,9 @@ impl Simulation {
                     |p| p == 1.0,
                 )?;
             }
+            let clumps = self.clump_count() as f64;
+            let word = "0 where the box moves: they do not go through its boundaries";
+            check("box: clumps, their number", clumps, word, |n| n == 0.0)?;
             let held = (0..self.grains.len())
                 .filter(|&i| self.grains.is_fixed(i))
                 .count();

@@ -97,13 +97,16 @@ impl Simulation {
         let left = |x: &[f64; 4]| !outlet.keep.contains(&cell.wrap(vector(x)).0);
         let n = self.grains.len();
         if self.steps.is_multiple_of(outlet.every) && self.grains.place[..n].iter().any(left) {
-            for i in (0..n).filter(|&i| left(&self.grains.place[i])) {
+            let mut goes: Vec<bool> = self.grains.place[..n].iter().map(left).collect();
+            self.whole_clumps(&mut goes);
+            for i in (0..n).filter(|&i| goes[i]) {
                 let out = self.held_momentum(i);
                 let outflow = &mut self.drain.outflow;
                 outflow.grains += 1;
                 outflow.mass += self.grains.mass[i];
                 outflow.momentum += out;
             }
+            self.drain.outflow.momentum += self.momentum_of_marked_clumps(&goes);
             self.remove(|grain| !outlet.keep.contains(&grain.position));
         }
         self.drain.outlet = Some(outlet);

@@ -121,6 +121,7 @@ impl Simulation {
                 row[..3].iter_mut().for_each(|c| *c *= factor);
             }
         }
+        self.damp_clumps(factor);
         self.open_account();
     }
 }

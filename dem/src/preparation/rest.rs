@@ -66,9 +66,9 @@ impl Simulation {
     pub fn rest_measures(&mut self, acceleration: f64) -> RestMeasures {
         self.observe();
         let free: Vec<usize> = (0..self.grains.len())
-            .filter(|&i| !self.grains.is_fixed(i))
+            .filter(|&i| self.moves_alone(i))
             .collect();
-        let count = free.len().max(1) as f64;
+        let count = (free.len() + self.clump_count()).max(1) as f64;
         let (mut kinetic, mut left, mut diameters, mut mass) = (0.0, 0.0, 0.0, 0.0);
         for &i in &free {
             let (v, w) = self.synchronised(i);
@@ -79,6 +79,12 @@ impl Simulation {
             diameters += 2.0 * r;
             mass += m;
         }
+        self.each_clump_at_rest(|[energy, force, diameter, m]| {
+            kinetic += energy;
+            left += force;
+            diameters += diameter;
+            mass += m;
+        });
         let rows = self.slot_rows();
         let pushes = self
             .reach

@@ -150,6 +150,8 @@ impl Simulation {
         self.wall_contacts.take_down(place);
         self.list_walls();
         self.settle_loads();
+        self.clumps
+            .settle(&self.grains, &self.list, &self.domain, true);
         self.renew_rows();
         self.make_reach(true);
         self.rebuilds += 1;

@@ -8,7 +8,9 @@ use crate::run::world::{Recipe, Stand, store};
 use crate::scene::Scene;
 use crate::scene::world::Materials;
 use colluvium_dem::preparation::{SizeLaw, Weight};
-use colluvium_dem::{Domain, Grain, Motion, Shape, Simulation, Threads, Wall};
+use colluvium_dem::{
+    Body, Domain, Freedom, Grain, Motion, Shape, Simulation, Solid, Threads, Wall,
+};
 use nalgebra::Vector3;
 use std::time::Instant;
 
@@ -111,6 +113,18 @@ fn say_world(lines: &mut Lines, stand: &Stand) {
         let topic = if k == 0 { "walls" } else { "" };
         lines.say(topic, &format!("{name}: {}", wall_in_words(wall)));
     }
+    for (k, (name, body)) in world.bodies.iter().enumerate() {
+        let topic = if k == 0 { "bodies" } else { "" };
+        lines.say(topic, &format!("{name}: {}", body_in_words(body)));
+    }
+    if !world.clumps.is_empty() {
+        let members: usize = world.clumps.iter().map(|clump| clump.grains.len()).sum();
+        let text = format!(
+            "{} of {members} balls, rigid, at random places; each moves by the forces on its balls",
+            world.clumps.len()
+        );
+        lines.say("clumps", &text);
+    }
     let g = world.gravity;
     let mut pulls = vec![format!("({:.4e}, {:.4e}, {:.4e}) m/s²", g.x, g.y, g.z)];
     if world.schedule.is_some() {
@@ -150,6 +164,40 @@ fn say_world(lines: &mut Lines, stand: &Stand) {
     for crack in &world.cracks {
         lines.say("crack", &format!("no bonds in {crack}"));
     }
+}
+
+fn body_in_words(body: &Body) -> String {
+    let mut words = Vec::new();
+    for part in &body.parts {
+        words.push(match &part.solid {
+            Solid::Sphere { radius } => format!("sphere of radius {radius} m"),
+            Solid::Cuboid { half_sides: h } => {
+                format!(
+                    "cuboid of {} m x {} m x {} m",
+                    2.0 * h.x,
+                    2.0 * h.y,
+                    2.0 * h.z
+                )
+            }
+            Solid::Frustum { radii, height } => {
+                format!("radii {} and {} m, {height} m long", radii[0], radii[1])
+            }
+            Solid::Mesh(mesh) => format!("mesh of {} triangles", mesh.triangles().len()),
+        });
+    }
+    let moves = match &body.freedom {
+        Freedom::Free => "free",
+        Freedom::Hinged(_) => "on a hinge",
+        Freedom::Driven(Motion::Fixed) => "held",
+        Freedom::Driven(_) => "driven",
+    };
+    let mass = match body.mass_properties("body") {
+        Ok(mass) if !matches!(body.freedom, Freedom::Driven(_)) => {
+            format!(", {:.4e} kg", mass.mass)
+        }
+        _ => String::new(),
+    };
+    format!("{}; {moves}{mass}", words.join(", "))
 }
 
 fn wall_in_words(wall: &Wall) -> String {

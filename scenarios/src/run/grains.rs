@@ -6,7 +6,7 @@ use super::world::workshop::Surroundings;
 use super::world::{Expected, Ran, Recipe, Workshop, World};
 use crate::failure::Failure;
 use crate::scene::world::{
-    Materials, OutputKeys, Place, PrepareKind, StepKeys, bond_rules, region, walls,
+    Materials, OutputKeys, Place, PrepareKind, StepKeys, bodies, bond_rules, clumps, region, walls,
 };
 use crate::scene::{GrainsScene, LawKeys, layers};
 use crate::summary::{Figure, Quantity, Summary};
@@ -69,7 +69,7 @@ impl Recipe for GrainsScene {
         }
         let mut keys = toml::Table::try_from(self).unwrap_or_default();
         for later in [
-            "duration", "packing", "velocity", "output", "bonds", "cracks",
+            "duration", "packing", "velocity", "output", "bodies", "clumps", "bonds", "cracks",
         ] {
             keys.remove(later);
         }
@@ -89,6 +89,10 @@ impl Recipe for GrainsScene {
         }
         let around = self.around(shop.materials, origin)?;
         steps::prepare(shop, &self.prepare, &around, origin)?;
+        if shop.packing.grains.is_empty() {
+            // Bodies alone.
+            return Ok(());
+        }
         let all = Surroundings {
             walls: around.walls.clone(),
             gravity: around.gravity,
@@ -100,7 +104,7 @@ impl Recipe for GrainsScene {
 
     fn world(
         &self,
-        _packing: &Packing,
+        packing: &Packing,
         materials: &Materials,
         origin: &str,
     ) -> Result<World, Failure> {
@@ -111,11 +115,20 @@ impl Recipe for GrainsScene {
             sphere: self.gravity.sphere(),
             own_gravity: self.gravity.own(),
             walls: named.zip(walls(&self.walls, materials, origin)?).collect(),
+            bodies: bodies(&self.bodies, materials, origin)?,
             bonds: bond_rules(&self.bonds, materials, origin)?,
             velocity: self.velocity.map(Vector3::from),
             ..World::empty(self.duration)
         };
-        world.speed = self.velocity.map_or(0.0, |v| Vector3::from(v).norm());
+        world.speed =
+            self.velocity.map_or(0.0, |v| Vector3::from(v).norm()) + world.speed_of_bodies(packing);
+        let domain = match &self.boundaries {
+            Some(boundaries) => boundaries.domain(origin)?,
+            None => packing.domain,
+        };
+        let place = (domain, packing.grains.as_slice());
+        let clumps = clumps(&self.clumps, materials, place, self.seed, origin)?;
+        (world.grains, world.clumps) = (clumps.grains, clumps.clumps);
         for (name, crack) in &self.cracks {
             let section = format!("cracks.{name}.within");
             let at = Place {
@@ -144,6 +157,8 @@ impl Recipe for GrainsScene {
             }),
         });
         let known: f64 = counts.filter(|n| n.is_finite()).sum();
+        let members = self.clumps.values().map(|c| c.count * c.balls.len());
+        let known = known + members.sum::<usize>() as f64;
         Expected {
             grains: known,
             preparation: None,
@@ -179,6 +194,17 @@ impl Recipe for GrainsScene {
             let place = Quantity::new(last(axis), "m").from("of the free grains at the end");
             summary.put(&name, place);
         }
+        for (body, name) in self.bodies.keys().enumerate() {
+            let sample = ran.simulation.body(body);
+            for (axis, x) in ["x", "y", "z"].into_iter().zip(sample.centre.iter()) {
+                let place = Quantity::new(*x, "m").from("of its centre of mass at the end");
+                summary.put(&format!("{name}_{axis}"), place);
+            }
+            let speed = Quantity::new(sample.velocity.norm(), "m/s").from("at the end");
+            summary.put(&format!("{name}_speed"), speed);
+            let spin = Quantity::new(sample.spin.norm(), "rad/s").from("at the end");
+            summary.put(&format!("{name}_spin"), spin);
+        }
         let domain = *ran.simulation.domain();
         if domain.periodic == [true; 3] && self.boundaries.as_ref().is_none_or(moves_not) {
             let grains = ran.simulation.grain_list();
@@ -197,6 +223,14 @@ impl Recipe for GrainsScene {
             ],
             "Energies of the grains in time.",
         ));
+        for name in self.bodies.keys() {
+            let columns = ["x", "y", "z"].map(|axis| (format!("{name}_{axis}"), axis));
+            let columns: Vec<(&str, &str)> =
+                columns.iter().map(|(c, w)| (c.as_str(), *w)).collect();
+            let text = format!("The centre of mass of the body {name} in time.");
+            let figure = Figure::history(&format!("{name} [m]"), &columns, &text);
+            summary.figures.push(figure);
+        }
         if !self.bonds.is_empty() {
             let columns = [("bonds", "whole"), ("broken_bonds", "broken")];
             let figure =

@@ -278,28 +278,12 @@ impl Recipe for TumblingBoxScene {
     }
 
     fn columns(&self) -> Vec<(String, &'static str)> {
-        let named = |name: &str, unit: &'static str| {
-            ["x", "y", "z"].map(|axis| (format!("lander_{name}{axis}"), unit))
-        };
-        let all = [
-            named("", "m"),
-            named("v", "m/s"),
-            named("w", "rad/s"),
-            named("f", "N"),
-        ];
-        let mut columns = all.concat();
-        columns.push(("lander_lowest".into(), "m"));
-        columns
+        vec![("lander_lowest".into(), "m")]
     }
 
     fn look(&self, _: &mut Simulation, seen: &Snapshot, _: &[f64]) -> Vec<f64> {
-        let Some(lander) = seen.bodies.first() else {
-            return vec![f64::NAN; 13];
-        };
-        let vectors = [lander.centre, lander.velocity, lander.spin, lander.force];
-        let mut row: Vec<f64> = vectors.iter().flat_map(|v| [v.x, v.y, v.z]).collect();
-        row.push(self.lowest(lander));
-        row
+        let lander = seen.bodies.first();
+        vec![lander.map_or(f64::NAN, |lander| self.lowest(lander))]
     }
 
     fn conclude(&self, ran: &mut Ran, summary: &mut Summary) -> Result<Vec<Table>, Failure> {

@@ -4,8 +4,8 @@
 //! example.
 
 use super::world::{
-    BondKeys, BoundaryKeys, CrackKeys, GrainMaterialKeys, GravityKeys, Materials, OutputKeys,
-    Place, PrepareKeys, StepKeys, SurfaceKeys, Triple, WallKeys, materials,
+    BodyKeys, BondKeys, BoundaryKeys, ClumpKeys, CrackKeys, GrainMaterialKeys, GravityKeys,
+    Materials, OutputKeys, Place, PrepareKeys, StepKeys, SurfaceKeys, Triple, WallKeys, materials,
 };
 use super::{LawKeys, SceneError};
 use schemars::JsonSchema;
@@ -50,6 +50,12 @@ pub struct GrainsScene {
     /// Walls by name.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub walls: BTreeMap<String, WallKeys>,
+    /// Rigid bodies by name; they are put in after the preparation.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub bodies: BTreeMap<String, BodyKeys>,
+    /// Clumps of grains by name; they are put in after the preparation.
+    #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
+    pub clumps: BTreeMap<String, ClumpKeys>,
     /// Bonds by name; they are made after the preparation.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub bonds: BTreeMap<String, BondKeys>,
@@ -85,12 +91,29 @@ impl GrainsScene {
 
     pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {
         self.materials(origin)?;
-        if self.prepare.is_empty() && self.packing.is_none() {
+        if self.prepare.is_empty()
+            && self.packing.is_none()
+            && self.bodies.is_empty()
+            && self.clumps.is_empty()
+        {
             return Err(SceneError::MissingKey {
                 file: origin.to_owned(),
                 key: "prepare".into(),
-                wanted: "steps [[prepare]], or a `packing` to start from".into(),
+                wanted:
+                    "steps [[prepare]], a `packing` to start from, or bodies or clumps alone: [bodies.NAME], [clumps.NAME]"
+                        .into(),
             });
+        }
+        if let Some(name) = self
+            .bodies
+            .keys()
+            .find(|name| self.walls.contains_key(*name))
+        {
+            let at = Place {
+                origin,
+                section: "bodies",
+            };
+            return Err(at.refuse(name, name, "a name that no wall has"));
         }
         for (k, step) in self.prepare.iter().enumerate() {
             let section = format!("prepare[{k}]");

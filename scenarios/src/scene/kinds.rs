@@ -82,8 +82,15 @@ kinds! {
     CliffAswan(CliffScene) = "cliff-aswan",
 }
 
-/// Dotted paths of files in scenes of grains; `*` stands for any name.
-const FILES: [&str; 4] = ["bed", "walls.*.file", "walls.*.motion.file", "gravity.file"];
+/// Dotted paths of files in scenes of grains; `*` stands for any name, or for each of a list.
+const FILES: [&str; 6] = [
+    "bed",
+    "walls.*.file",
+    "walls.*.motion.file",
+    "bodies.*.parts.*.file",
+    "bodies.*.motion.file",
+    "gravity.file",
+];
 
 /// Makes relative paths of a scene file relative to that file's folder.
 pub(super) fn anchor(table: &mut toml::Table, folder: &std::path::Path) {
@@ -104,11 +111,14 @@ pub(super) fn anchor_packing(table: &mut toml::Table, key: &str, folder: &std::p
 fn anchor_at(table: &mut toml::Table, path: &str, folder: &std::path::Path) {
     match path.split_once(".*.") {
         Some((head, rest)) => {
-            if let Some(toml::Value::Table(named)) = table.get_mut(head) {
-                for (_, inner) in named.iter_mut() {
-                    if let toml::Value::Table(inner) = inner {
-                        anchor_at(inner, rest, folder);
-                    }
+            let inner: Vec<&mut toml::Value> = match table.get_mut(head) {
+                Some(toml::Value::Table(named)) => named.iter_mut().map(|(_, v)| v).collect(),
+                Some(toml::Value::Array(listed)) => listed.iter_mut().collect(),
+                _ => Vec::new(),
+            };
+            for inner in inner {
+                if let toml::Value::Table(inner) = inner {
+                    anchor_at(inner, rest, folder);
                 }
             }
         }
@@ -130,11 +140,13 @@ pub(super) fn inputs(table: &toml::Table) -> Vec<std::path::PathBuf> {
 fn gather(table: &toml::Table, path: &str, into: &mut Vec<std::path::PathBuf>) {
     match path.split_once(".*.") {
         Some((head, rest)) => {
-            let named = table.get(head).and_then(toml::Value::as_table);
-            for inner in named.into_iter().flat_map(|t| t.values()) {
-                if let Some(inner) = inner.as_table() {
-                    gather(inner, rest, into);
-                }
+            let inner: Vec<&toml::Value> = match table.get(head) {
+                Some(toml::Value::Table(named)) => named.values().collect(),
+                Some(toml::Value::Array(listed)) => listed.iter().collect(),
+                _ => Vec::new(),
+            };
+            for inner in inner.into_iter().filter_map(toml::Value::as_table) {
+                gather(inner, rest, into);
             }
         }
         None => {

@@ -5,8 +5,10 @@
 //! scene takes the sections it needs into its struct; `grains` takes all of them.
 
 mod averages;
+mod bodies;
 mod bonds;
 mod boundaries;
+mod clumps;
 mod gravity;
 mod materials;
 mod motion;
@@ -17,8 +19,10 @@ mod sizes;
 mod walls;
 
 pub use averages::{AverageKeys, GeometryKind, KernelKind};
+pub use bodies::{BodyKeys, FreedomKind, HingeKeys, PartKeys, PartKind, bodies};
 pub use bonds::{BondKeys, CrackKeys, bond_rules};
 pub use boundaries::{BoundaryKeys, BoxMotionKeys, BoxMotionKind, OutletKeys};
+pub use clumps::{AllClumps, BallKeys, ClumpKeys, clumps};
 pub use gravity::{GravityKeys, HeavySphereKeys, SelfGravityKeys};
 pub use materials::{GrainMaterialKeys, Materials, SurfaceKeys, materials};
 pub use motion::{MotionKeys, MotionKind};

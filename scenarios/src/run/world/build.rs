@@ -6,8 +6,8 @@ use crate::scene::world::Materials;
 use colluvium_dem::preparation::Packing;
 use colluvium_dem::timestep::{self, Choice, Conditions, Shares};
 use colluvium_dem::{
-    Body, BondRule, BoxMotion, Domain, Grain, HeavySphere, Outlet, Record, Region, Schedule,
-    SelfGravity, Setup, SetupError, Simulation, Threads, Wall,
+    Body, BondRule, BoxMotion, Clump, Domain, Freedom, Grain, HeavySphere, Outlet, Partner, Record,
+    Region, Schedule, SelfGravity, Setup, SetupError, Simulation, Snapshot, Threads, Touched, Wall,
 };
 use nalgebra::Vector3;
 
@@ -28,6 +28,8 @@ pub struct World {
     pub walls: Vec<(String, Wall)>,
     /// Rigid bodies with their names.
     pub bodies: Vec<(String, Body)>,
+    /// Grains that move as one, by number.
+    pub clumps: Vec<Clump>,
     /// Bonds that are made at the start.
     pub bonds: Vec<BondRule>,
     /// Where bonds are taken away again.
@@ -57,6 +59,7 @@ impl World {
             own_gravity: None,
             walls: Vec::new(),
             bodies: Vec::new(),
+            clumps: Vec::new(),
             bonds: Vec::new(),
             cracks: Vec::new(),
             box_motion: BoxMotion::Rest,
@@ -81,6 +84,9 @@ pub struct Stand {
     /// Steps of the whole run.
     pub steps: u64,
 }
+
+/// Deepest overlap of a body at the start, over the radius of a grain or the rounding of its edges.
+const DEEPEST: f64 = 0.2;
 
 /// Most steps of a run.
 const MOST_STEPS: f64 = 1.0e10;
@@ -156,6 +162,9 @@ impl Stand {
     pub fn start(&self) -> Result<Simulation, SetupError> {
         let world = &self.world;
         let mut simulation = Simulation::new(self.setup.clone())?;
+        if !world.clumps.is_empty() {
+            simulation.clump(&world.clumps)?;
+        }
         for rule in &world.bonds {
             simulation.bond(rule)?;
         }
@@ -172,6 +181,52 @@ impl Stand {
         Ok(simulation)
     }
 
+    /// Checks that bodies have room at the start.
+    pub fn check_room(&self, simulation: &mut Simulation, origin: &str) -> Result<(), Failure> {
+        let names = |body: usize| self.world.bodies[body].0.as_str();
+        let refuse = |body: usize, reaches: String| {
+            // The grains are in place by now: a run has begun.
+            Err(Failure::Run(format!(
+                "{origin}: bodies.{}: {reaches}; allowed: a place where it has room: keys `point`, `turn_degrees`",
+                names(body)
+            )))
+        };
+        let mut seen = Snapshot::default();
+        simulation.snapshot(&mut seen);
+        for contact in &seen.contacts {
+            let Partner::Body(body) = contact.partner else {
+                continue;
+            };
+            let grain = &seen.grains[contact.grain];
+            if contact.overlap > DEEPEST * grain.radius {
+                let at = grain.position;
+                let reaches = format!(
+                    "it reaches {:.3e} m into grain {} of radius {:.3e} m at ({:.4e}, {:.4e}, {:.4e})",
+                    contact.overlap, grain.id, grain.radius, at.x, at.y, at.z
+                );
+                return refuse(body, reaches);
+            }
+        }
+        for contact in &seen.body_contacts {
+            let parts = &self.world.bodies[contact.body].1.parts;
+            let rounding = parts
+                .iter()
+                .map(|p| p.rounding)
+                .fold(f64::INFINITY, f64::min);
+            if contact.overlap > DEEPEST * rounding {
+                let other = match contact.partner {
+                    Touched::Wall(wall) => format!("the wall {}", self.world.walls[wall].0),
+                    Touched::Body(body) => format!("the body {}", names(body)),
+                };
+                return refuse(
+                    contact.body,
+                    format!("it reaches {:.3e} m into {other}", contact.overlap),
+                );
+            }
+        }
+        Ok(())
+    }
+
     /// The simulation at a checkpoint of it.
     pub fn resume(&self, record: &Record) -> Result<Simulation, SetupError> {
         let mut simulation = Simulation::resume(self.setup.clone(), record)?;
@@ -182,6 +237,28 @@ impl Stand {
 }
 
 impl World {
+    /// Largest speed of the bodies at the start, with a fall to the lowest grain or wall (m/s).
+    pub fn speed_of_bodies(&self, packing: &Packing) -> f64 {
+        let g = self.gravity.norm();
+        let depth = |x: &Vector3<f64>| x.dot(&self.gravity) / g.max(f64::MIN_POSITIVE);
+        let grains = packing.grains.iter().map(|grain| depth(&grain.position));
+        let walls = self.walls.iter().map(|(_, w)| depth(&w.pose.position));
+        let lowest = grains.chain(walls).fold(f64::NEG_INFINITY, f64::max);
+        let speed = |body: &Body| {
+            let fall = (lowest - depth(&body.pose.position)).max(0.0);
+            let fall = if fall.is_finite() { fall } else { 0.0 };
+            let parts = body.parts.iter();
+            let far = parts.map(|p| p.pose.position.norm() + p.solid.extent());
+            let turning = body.spin.norm() * far.fold(0.0, f64::max);
+            body.velocity.norm() + turning + (2.0 * g * fall).sqrt()
+        };
+        let bodies = self
+            .bodies
+            .iter()
+            .filter(|(_, b)| b.freedom == Freedom::Free);
+        bodies.map(|(_, body)| speed(body)).fold(0.0, f64::max)
+    }
+
     /// The limits of the step and the step they allow: contacts at the speeds to be expected, and bonds.
     fn choose_step(&self, setup: &Setup, safety: f64) -> Result<Choice, SetupError> {
         let fall = Conditions::of(&setup.grains, &self.gravity);

@@ -170,6 +170,9 @@ pub fn run(recipe: &dyn Recipe, under: &mut Under) -> Result<Findings, Failure> 
         }
         None => {
             let mut simulation = stand.start().map_err(refused)?;
+            if !stand.world.bodies.is_empty() {
+                stand.check_room(&mut simulation, &origin)?;
+            }
             if recipe.output().ledger {
                 simulation.open_energy_ledger();
             }
@@ -316,7 +319,13 @@ fn findings(
     under: &Under,
 ) -> Result<Findings, Failure> {
     let mut summary = Summary::begun(&under.scene.name, "run");
-    let grains = ran.packing.grains.len() as u64;
+    let members = ran
+        .stand
+        .world
+        .clumps
+        .iter()
+        .map(|clump| clump.grains.len());
+    let grains = (ran.packing.grains.len() + members.sum::<usize>()) as u64;
     let (taken, choice) = (ran.stand.setup.timestep, &ran.stand.choice);
     summary.model = Model {
         grains,

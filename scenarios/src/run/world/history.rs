@@ -27,6 +27,30 @@ const STATE: [(&str, &str); 16] = [
     ("broken_bonds", "1"),
 ];
 
+/// Columns of a body: its centre of mass, velocity and spin, the quaternion of its own axes, and the mean
+/// force and torque about its centre of mass (free), hinge or own origin since the row before.
+const BODY: [(&str, &str); 19] = [
+    ("x", "m"),
+    ("y", "m"),
+    ("z", "m"),
+    ("vx", "m/s"),
+    ("vy", "m/s"),
+    ("vz", "m/s"),
+    ("wx", "rad/s"),
+    ("wy", "rad/s"),
+    ("wz", "rad/s"),
+    ("q0", "1"),
+    ("q1", "1"),
+    ("q2", "1"),
+    ("q3", "1"),
+    ("fx", "N"),
+    ("fy", "N"),
+    ("fz", "N"),
+    ("tx", "N m"),
+    ("ty", "N m"),
+    ("tz", "N m"),
+];
+
 /// Columns of the ledger.
 const LEDGER: [(&str, &str); 5] = [
     ("normal_loss", "J"),
@@ -61,6 +85,9 @@ impl History {
         }
         for (name, _) in &world.walls {
             columns.extend(["fx", "fy", "fz"].map(|axis| (format!("{name}_{axis}"), "N")));
+        }
+        for (name, _) in &world.bodies {
+            columns.extend(BODY.map(|(column, unit)| (format!("{name}_{column}"), unit)));
         }
         columns.extend(recipe.columns());
         History {
@@ -149,6 +176,27 @@ impl History {
             };
             simulation.forget_wall_taken(wall);
             row.extend(mean.iter().map(|f| f + 0.0));
+        }
+        for (body, sample) in seen.bodies.iter().enumerate() {
+            let taken = simulation.body_taken(body);
+            let mean = |sum: Vector3<f64>, now: Vector3<f64>| {
+                if taken.duration > 0.0 {
+                    sum / taken.duration
+                } else {
+                    now
+                }
+            };
+            let loads = [
+                mean(taken.impulse, sample.force),
+                mean(taken.angular, sample.torque),
+            ];
+            simulation.forget_body_taken(body);
+            let q = sample.pose.orientation.quaternion();
+            for v in [&sample.centre, &sample.velocity, &sample.spin] {
+                row.extend(v.iter());
+            }
+            row.extend([q.w, q.i, q.j, q.k]);
+            row.extend(loads.iter().flatten().map(|f| f + 0.0));
         }
         row.extend(recipe.look(simulation, seen, state));
         self.rows.push(row);

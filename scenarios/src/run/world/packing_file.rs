@@ -195,7 +195,8 @@ fn check(stored: &Stored) -> Result<(), String> {
             return Err(format!("grain {k} is of a material without a name"));
         }
     }
-    if stored.packing.grains.is_empty() {
+    // A scene of bodies or clumps alone prepares none.
+    if stored.packing.grains.is_empty() && !stored.provenance.is_empty() {
         return Err("it holds no grains".into());
     }
     Ok(())
