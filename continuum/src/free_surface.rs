@@ -21,6 +21,7 @@ mod transport;
 pub use faces::ThinLayer;
 pub use fields::CellFields;
 pub use flow::{
-    SpaceFlow, SpaceState, Spent, SurfaceFlow, SurfaceOptions, SurfaceState, SurfaceStep,
+    SpaceFields, SpaceFlow, SpaceState, Spent, SurfaceFlow, SurfaceOptions, SurfaceState,
+    SurfaceStep,
 };
 pub use ground::{Contact, Terrain};

@@ -16,6 +16,7 @@ mod collapse;
 mod collapse_grains;
 mod collapse_terrain;
 mod comet;
+mod cylinder;
 mod error;
 mod friction_keys;
 mod grains;
@@ -46,6 +47,7 @@ pub use collapse::{
 pub use collapse_grains::{CalibratedKind, ColumnFloorKind, ColumnGrainKeys};
 pub use collapse_terrain::{ContactKind, TerrainKeys};
 pub use comet::{CometBlockKeys, CometKeys, MixKind, Softness};
+pub use cylinder::{CylinderGrid, CylinderScene};
 pub use error::SceneError;
 pub use grains::GrainsScene;
 pub use impact::{ImpactScene, RollingKeys};
@@ -69,7 +71,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// The names and texts of the bundled scenes.
-pub const BUNDLED: [(&str, &str); 20] = [
+pub const BUNDLED: [(&str, &str); 21] = [
     ("incline", include_str!("../scenes/incline.toml")),
     (
         "incline-moderate",
@@ -105,6 +107,10 @@ pub const BUNDLED: [(&str, &str); 20] = [
         "column-collapse",
         include_str!("../scenes/column-collapse.toml"),
     ),
+    (
+        "cylinder-collapse",
+        include_str!("../scenes/cylinder-collapse.toml"),
+    ),
     ("cliff", include_str!("../scenes/cliff.toml")),
     ("cliff-aswan", include_str!("../scenes/cliff-aswan.toml")),
     ("cliff-plain", include_str!("../scenes/cliff-plain.toml")),
@@ -135,6 +141,8 @@ pub enum SceneBody {
     Grains(Box<Kind>),
     /// A column of material that collapses.
     Collapse(Box<CollapseScene>),
+    /// A cylinder of material that collapses, in space.
+    Cylinder(Box<CylinderScene>),
 }
 
 impl SceneBody {
@@ -148,6 +156,7 @@ impl SceneBody {
             SceneBody::Settle(scene) => toml::Table::try_from(scene),
             SceneBody::Grains(kind) => kind.to_table(),
             SceneBody::Collapse(scene) => toml::Table::try_from(scene),
+            SceneBody::Cylinder(scene) => toml::Table::try_from(scene),
         }
         .unwrap_or_default()
     }
@@ -231,7 +240,7 @@ impl Scene {
         // only the stiffness keys have defaults to drop.
         let kind = family(&name);
         let drops: &[&[&str]] = match kind {
-            Family::Bagnold => &[],
+            Family::Bagnold | Family::Cylinder => &[],
             Family::Collapse => &law::CHOICES,
             Family::Incline => &INCLINE_CHOICES[..1],
             _ => choices,
@@ -295,7 +304,7 @@ impl Scene {
             law_layers::drop_unread(&mut table, impact);
         }
         let of_incline = matches!(kind, Family::Incline) && table.contains_key("rheology");
-        if of_incline || matches!(kind, Family::Bagnold | Family::Collapse) {
+        if of_incline || matches!(kind, Family::Bagnold | Family::Collapse | Family::Cylinder) {
             // A bundled scene has the numbers of all laws, as defaults.
             if folder.is_some() && !friction_keys::chooses(&set) {
                 friction_keys::check_read(&table, &written, origin)?;
@@ -372,6 +381,7 @@ impl Scene {
             SceneBody::Settle(scene) => scene.check_together(origin),
             SceneBody::Grains(kind) => kind.check_together(origin),
             SceneBody::Collapse(scene) => scene.check_together(origin),
+            SceneBody::Cylinder(scene) => scene.check_together(origin),
         }
     }
 }
@@ -421,6 +431,7 @@ fn body(name: &str, table: &toml::Table) -> Result<SceneBody, String> {
             None => return Err(format!("no scene is called `{name}`")),
         },
         Family::Collapse => SceneBody::Collapse(table.try_into().map_err(plain)?),
+        Family::Cylinder => SceneBody::Cylinder(table.try_into().map_err(plain)?),
     })
 }
 
@@ -439,6 +450,7 @@ enum Family {
     Settle,
     Grains,
     Collapse,
+    Cylinder,
 }
 
 /// What a scene of this kind builds on. A `grains` scene stands for itself: walls and grains of the
@@ -458,6 +470,7 @@ fn family(name: &str) -> Family {
         "settle" => Family::Settle,
         _ if Kind::NAMES.contains(&name) => Family::Grains,
         "column-collapse" | "cliff-plain" => Family::Collapse,
+        "cylinder-collapse" => Family::Cylinder,
         _ => Family::Incline,
     }
 }
@@ -466,7 +479,7 @@ fn family(name: &str) -> Family {
 fn alternatives(name: &str) -> &'static [&'static [&'static str]] {
     match family(name) {
         Family::Incline => &INCLINE_CHOICES,
-        Family::Bagnold => rheology_file::ALTERNATIVES,
+        Family::Bagnold | Family::Cylinder => rheology_file::ALTERNATIVES,
         Family::Collapse => &COLLAPSE_CHOICES,
         Family::Impact | Family::Grains => &law::CHOICES,
         Family::Chute | Family::Settle => &BED_CHOICES,
@@ -522,6 +535,7 @@ fn body_schema(name: &str) -> Value {
         Family::Settle => schemars::schema_for!(SettleScene),
         Family::Grains => return Kind::schema(name).unwrap_or_default(),
         Family::Collapse => schemars::schema_for!(CollapseScene),
+        Family::Cylinder => schemars::schema_for!(CylinderScene),
     };
     schema.to_value()
 }

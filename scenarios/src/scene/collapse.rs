@@ -132,14 +132,8 @@ impl CollapseScene {
     }
 
     pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {
-        let refused = |key: &str, value: String, range: String| {
-            Err(SceneError::OutOfRange {
-                file: origin.to_owned(),
-                key: key.into(),
-                value,
-                range,
-            })
-        };
+        let refused =
+            |key: &str, value: String, range: String| Err(out_of_range(origin, key, value, range));
         match self.model {
             CollapseModel::Hybrid => {
                 return refused(
@@ -175,32 +169,48 @@ impl CollapseScene {
                 );
             }
         }
-        let r = &self.rheology;
-        if let Some([low, high]) = r.valid_i.as_deref()
-            && low >= high
-        {
-            return refused(
-                "rheology.valid_i",
-                format!("[{low}, {high}]"),
-                "[low, high] with low < high".into(),
-            );
-        }
-        if r.law != FrictionLaw::MuI {
-            return refused(
-                "rheology.law",
-                r.law.word().into(),
-                "mu-i: columns collapse under this law alone".into(),
-            );
-        }
-        if let (Some(mu_s), Some(mu_2)) = (r.mu_s, r.mu_2)
-            && mu_2 < mu_s
-        {
-            return refused(
-                "rheology.mu_2",
-                mu_2.to_string(),
-                format!("at least rheology.mu_s = {mu_s}"),
-            );
-        }
-        Ok(())
+        check_rheology(&self.rheology, origin)
     }
+}
+
+/// A value that is not allowed.
+pub(super) fn out_of_range(origin: &str, key: &str, value: String, range: String) -> SceneError {
+    SceneError::OutOfRange {
+        file: origin.to_owned(),
+        key: key.into(),
+        value,
+        range,
+    }
+}
+
+/// Refuses laws under which nothing can collapse.
+pub(super) fn check_rheology(r: &RheologyKeys, origin: &str) -> Result<(), SceneError> {
+    let refused =
+        |key: &str, value: String, range: String| Err(out_of_range(origin, key, value, range));
+    if let Some([low, high]) = r.valid_i.as_deref()
+        && low >= high
+    {
+        return refused(
+            "rheology.valid_i",
+            format!("[{low}, {high}]"),
+            "[low, high] with low < high".into(),
+        );
+    }
+    if r.law != FrictionLaw::MuI {
+        return refused(
+            "rheology.law",
+            r.law.word().into(),
+            "mu-i: columns collapse under this law alone".into(),
+        );
+    }
+    if let (Some(mu_s), Some(mu_2)) = (r.mu_s, r.mu_2)
+        && mu_2 < mu_s
+    {
+        return refused(
+            "rheology.mu_2",
+            mu_2.to_string(),
+            format!("at least rheology.mu_s = {mu_s}"),
+        );
+    }
+    Ok(())
 }
