@@ -77,6 +77,9 @@ pub(super) fn options_of(keys: &CollapseSolver) -> SurfaceOptions {
         ..SurfaceOptions::default()
     };
     options.solver.strain_rate_floor = keys.strain_rate_floor;
+    if let Some(tolerance) = keys.linear_tolerance {
+        options.solver.linear_tolerance = tolerance;
+    }
     options
 }
 

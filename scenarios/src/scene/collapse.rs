@@ -108,6 +108,10 @@ pub struct CollapseSolver {
     pub strain_rate_floor: f64,
     /// How layers thinner than half a cell move over the floor.
     pub thin_layer: ThinLayerKind,
+    /// Relative residual to which the linear system of an iteration is solved; 1e-3 where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minimum" = 1.0e-12, "maximum" = 0.1))]
+    pub linear_tolerance: Option<f64>,
 }
 
 /// How layers thinner than half a cell move over the floor.
