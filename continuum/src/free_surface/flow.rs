@@ -714,6 +714,8 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             .as_ref()
             .is_none_or(|(known, _)| *known != pattern)
         {
+            // The old factors make room first: in space they are most of the memory.
+            self.solver = None;
             self.solver = Some((
                 pattern,
                 PrimalDual::new(&discretisation, self.options.solver)?,

@@ -4,8 +4,8 @@ use super::Lines;
 use crate::run;
 use crate::scene::CylinderScene;
 
-/// Peak memory for each cell with a pressure (bytes), measured.
-const MEMORY_PER_CELL: f64 = 6.0e4;
+/// Peak memory for each cell with a pressure (bytes), as measured with a thousand of them.
+const MEMORY_PER_CELL: f64 = 2.0e5;
 
 pub(super) fn cylinder(body: &CylinderScene) -> String {
     let mut lines = Lines::default();

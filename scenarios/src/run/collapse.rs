@@ -3,7 +3,7 @@
 mod beside_continuum;
 
 use super::bagnold::failure;
-use super::surface_steps::{Steps, columns, put_state, state_of};
+use super::surface_steps::{FRONTS, PROFILES, Steps, columns, join_pictures, put_state, state_of};
 use super::{Findings, Under, collapse_ground, world};
 use crate::cost::Cost;
 use crate::failure::Failure;
@@ -30,10 +30,6 @@ pub const LEFT_OUT: [&str; 5] = [
     "the third dimension",
     "non-local effects near the base",
 ];
-/// Instants of the front over the duration.
-const FRONTS: f64 = 240.0;
-/// Instants of the profile over the duration.
-const PROFILES: f64 = 24.0;
 
 /// The case that a scene describes.
 pub fn case(scene: &CollapseScene) -> CollapseCase {
@@ -251,11 +247,9 @@ pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, 
     bar.clear();
     let wall_s = under.wall_s();
     course.see_front(&collapse, threshold);
-    join_pictures(
-        under,
-        &collapse,
-        (collapse.time() / end * FRONTS + 1e-6) as u64,
-    )?;
+    join_pictures(under, collapse.time() / end, |last| {
+        picture(under, &collapse, last)
+    })?;
     let mut summary = Summary::begun(&under.scene.name, "run");
     describe(&mut summary, scene, &collapse, &course, wall_s);
     Ok(Findings {
@@ -269,17 +263,6 @@ pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, 
 fn picture(under: &Under, collapse: &Collapse, instant: u64) -> Result<(), Failure> {
     let frame = fields(collapse);
     frames::put(under.directory.path(), frames::FIELDS, instant, frame)
-}
-
-/// Joins the fields at all instants of the profile up to the last one of the front, and those of the end.
-fn join_pictures(under: &Under, collapse: &Collapse, last: u64) -> Result<(), Failure> {
-    let every = (FRONTS / PROFILES) as u64;
-    let mut numbers: Vec<u64> = (0..=last).step_by(every as usize).collect();
-    if !last.is_multiple_of(every) {
-        picture(under, collapse, last)?;
-        numbers.push(last);
-    }
-    frames::join(under.directory.path(), frames::FIELDS, &numbers)
 }
 
 /// Cells with material as quadrilaterals in the plane y = 0.

@@ -2,7 +2,7 @@
 
 use super::bagnold::failure;
 use super::collapse::options_of;
-use super::surface_steps::{Steps, columns, put_state, state_of};
+use super::surface_steps::{FRONTS, PROFILES, Steps, columns, join_pictures, put_state, state_of};
 use super::{Findings, Under};
 use crate::cost::Cost;
 use crate::failure::Failure;
@@ -25,10 +25,6 @@ pub const LEFT_OUT: [&str; 4] = [
     "dilatancy (constant solid fraction)",
     "non-local effects near the base",
 ];
-/// Instants of the front over the duration.
-const FRONTS: f64 = 240.0;
-/// Instants of profile and fields over the duration.
-const PROFILES: f64 = 24.0;
 
 /// The case that a scene describes.
 pub fn case(scene: &CylinderScene) -> CylinderCase {
@@ -161,14 +157,9 @@ pub(super) fn run(scene: &CylinderScene, under: &mut Under) -> Result<Findings, 
     bar.clear();
     let wall_s = under.wall_s();
     course.see_front(&collapse, threshold);
-    let last = (collapse.time() / end * FRONTS + 1e-6) as u64;
-    let every = (FRONTS / PROFILES) as u64;
-    let mut instants: Vec<u64> = (0..=last).step_by(every as usize).collect();
-    if !last.is_multiple_of(every) {
-        picture(under, &collapse, last)?;
-        instants.push(last);
-    }
-    frames::join(under.directory.path(), frames::FIELDS, &instants)?;
+    join_pictures(under, collapse.time() / end, |last| {
+        picture(under, &collapse, last)
+    })?;
     let mut summary = Summary::begun(&under.scene.name, "run");
     describe(&mut summary, scene, &collapse, &course, wall_s);
     Ok(Findings {

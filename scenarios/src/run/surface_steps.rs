@@ -1,9 +1,16 @@
 //! Flows with a moving surface: what their steps add up to, and their state in checkpoints.
 
+use super::Under;
+use crate::failure::Failure;
+use crate::frames;
 use crate::summary::{Quantity, Summary};
 use colluvium_continuum::free_surface::{SurfaceState, SurfaceStep};
 use colluvium_dem::Record;
 
+/// Instants of the front over the duration.
+pub(super) const FRONTS: f64 = 240.0;
+/// Instants of profile and fields over the duration.
+pub(super) const PROFILES: f64 = 24.0;
 /// Steps at rest after which a run ends.
 const REST_STEPS: u64 = 3;
 
@@ -113,6 +120,23 @@ impl Steps {
             "at which rigid matter creeps",
         );
     }
+}
+
+/// Joins the fields at all instants of the profile up to the last one of the front, at a time over the
+/// duration, and those of the end, which `picture` writes.
+pub(super) fn join_pictures(
+    under: &Under,
+    time: f64,
+    picture: impl FnOnce(u64) -> Result<(), Failure>,
+) -> Result<(), Failure> {
+    let last = (time * FRONTS + 1e-6) as u64;
+    let every = (FRONTS / PROFILES) as u64;
+    let mut instants: Vec<u64> = (0..=last).step_by(every as usize).collect();
+    if !last.is_multiple_of(every) {
+        picture(last)?;
+        instants.push(last);
+    }
+    frames::join(under.directory.path(), frames::FIELDS, &instants)
 }
 
 /// Names of the velocity's components.
