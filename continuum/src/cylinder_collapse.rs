@@ -11,7 +11,7 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, require};
-use crate::free_surface::{SpaceFlow, SpaceState, SurfaceOptions, SurfaceStep};
+use crate::free_surface::{SpaceFields, SpaceFlow, SpaceState, SurfaceOptions, SurfaceStep};
 use crate::grid::{Axis, Boundary, Grid};
 use crate::rheology::{MuI, Rheology};
 use crate::units::Units;
@@ -288,6 +288,31 @@ impl CylinderCollapse {
             }
         }
         largest
+    }
+
+    /// Fields of the cells with material, x fastest, in SI units; the axis of the cylinder is at x = y = 0.
+    pub fn fields(&self) -> Vec<SpaceFields> {
+        let (units, length) = (&self.units, self.case.height);
+        let edge = if self.case.whole {
+            self.case.length_scaled * length
+        } else {
+            0.0
+        };
+        let mut fields = self.flow.cell_fields();
+        for f in &mut fields {
+            for corner in [&mut f.lower, &mut f.upper] {
+                *corner = [
+                    corner[0] * length - edge,
+                    corner[1] * length - edge,
+                    corner[2] * length,
+                ];
+            }
+            f.velocity = f.velocity.map(|u| u * units.velocity);
+            f.pressure *= units.stress();
+            f.stress = f.stress.map(|s| s * units.stress());
+            f.strain_rate /= units.time();
+        }
+        fields
     }
 
     /// Heights of material above the cells of a quarter of the floor (m), x fastest, from the axis outwards.

@@ -23,7 +23,8 @@ mod transport;
 pub use faces::ThinLayer;
 pub use fields::CellFields;
 pub use flow::{
-    SpaceFlow, SpaceState, Spent, SurfaceFlow, SurfaceOptions, SurfaceState, SurfaceStep,
+    SpaceFields, SpaceFlow, SpaceState, Spent, SurfaceFlow, SurfaceOptions, SurfaceState,
+    SurfaceStep,
 };
 pub use ground::{Contact, Terrain};
 pub use open_ends::Inflow;

@@ -2,6 +2,7 @@
 
 mod bed;
 mod collapse;
+mod cylinder;
 mod joined_incline;
 mod law;
 mod world;
@@ -41,6 +42,7 @@ pub fn plan(scene: &Scene) -> Result<String, Failure> {
             let ground = run::collapse_ground::ground(body, &scene.origin)?;
             Ok(collapse::collapse(body, ground.as_ref()))
         }
+        SceneBody::Cylinder(body) => Ok(cylinder::cylinder(body)),
         SceneBody::Impact(body) => impact(scene, body),
         SceneBody::Chute(body) => bed::chute(body),
         SceneBody::Settle(body) => bed::settle(body),

@@ -13,6 +13,7 @@ mod column_of_grains;
 mod comet;
 mod comet_block;
 pub mod continuum_incline;
+pub mod cylinder;
 pub mod energy_table;
 pub mod grain_table;
 mod grains;
@@ -27,6 +28,7 @@ pub mod precheck;
 pub mod settle;
 mod silo;
 pub mod step;
+mod surface_steps;
 mod tensile;
 mod tumbling_box;
 pub mod world;
@@ -241,6 +243,7 @@ pub fn check(scene: &Scene) -> Result<(), Failure> {
         SceneBody::Settle(body) => settle::check(scene, body),
         SceneBody::Grains(kind) => world::course::check(scene, kind.recipe()),
         SceneBody::Collapse(body) => collapse::check(scene, body),
+        SceneBody::Cylinder(body) => cylinder::check(scene, body),
     }
 }
 
@@ -294,6 +297,7 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> {
             SceneBody::Settle(body) => settle::run(body, &mut under),
             SceneBody::Grains(kind) => world::course::run(kind.recipe(), &mut under),
             SceneBody::Collapse(body) => collapse::run(body, &mut under),
+            SceneBody::Cylinder(body) => cylinder::run(body, &mut under),
         })
     });
     let (begun, wall_s, going_on) = (under.begun, under.wall_s(), under.resumed.is_some());

@@ -17,6 +17,7 @@ mod collapse_grains;
 mod collapse_terrain;
 mod collapse_zones;
 mod comet;
+mod cylinder;
 mod error;
 mod friction_keys;
 mod friction_law;
@@ -49,6 +50,7 @@ pub use collapse_grains::{CalibratedKind, ColumnFloorKind, ColumnGrainKeys};
 pub use collapse_terrain::{ContactKind, TerrainKeys};
 pub use collapse_zones::{ColumnOverlapKeys, ColumnZoneKeys, DENSE};
 pub use comet::{CometBlockKeys, CometKeys, MixKind, Softness};
+pub use cylinder::{CylinderGrid, CylinderScene};
 pub use error::SceneError;
 pub use friction_law::LawVisitor;
 pub use grains::GrainsScene;
@@ -73,7 +75,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// The names and texts of the bundled scenes.
-pub const BUNDLED: [(&str, &str); 20] = [
+pub const BUNDLED: [(&str, &str); 21] = [
     ("incline", include_str!("../scenes/incline.toml")),
     (
         "incline-moderate",
@@ -109,6 +111,10 @@ pub const BUNDLED: [(&str, &str); 20] = [
         "column-collapse",
         include_str!("../scenes/column-collapse.toml"),
     ),
+    (
+        "cylinder-collapse",
+        include_str!("../scenes/cylinder-collapse.toml"),
+    ),
     ("cliff", include_str!("../scenes/cliff.toml")),
     ("cliff-aswan", include_str!("../scenes/cliff-aswan.toml")),
     ("cliff-plain", include_str!("../scenes/cliff-plain.toml")),
@@ -139,6 +145,8 @@ pub enum SceneBody {
     Grains(Box<Kind>),
     /// A column of material that collapses.
     Collapse(Box<CollapseScene>),
+    /// A cylinder of material that collapses, in space.
+    Cylinder(Box<CylinderScene>),
 }
 
 impl SceneBody {
@@ -152,6 +160,7 @@ impl SceneBody {
             SceneBody::Settle(scene) => toml::Table::try_from(scene),
             SceneBody::Grains(kind) => kind.to_table(),
             SceneBody::Collapse(scene) => toml::Table::try_from(scene),
+            SceneBody::Cylinder(scene) => toml::Table::try_from(scene),
         }
         .unwrap_or_default()
     }
@@ -235,7 +244,7 @@ impl Scene {
         // only the stiffness keys have defaults to drop.
         let kind = family(&name);
         let drops: &[&[&str]] = match kind {
-            Family::Bagnold => &[],
+            Family::Bagnold | Family::Cylinder => &[],
             Family::Collapse => &law::CHOICES,
             Family::Incline => &INCLINE_CHOICES[..1],
             _ => choices,
@@ -299,7 +308,7 @@ impl Scene {
             law_layers::drop_unread(&mut table, impact);
         }
         let of_incline = matches!(kind, Family::Incline) && table.contains_key("rheology");
-        if of_incline || matches!(kind, Family::Bagnold | Family::Collapse) {
+        if of_incline || matches!(kind, Family::Bagnold | Family::Collapse | Family::Cylinder) {
             // A bundled scene has the numbers of all laws, as defaults.
             if folder.is_some() && !friction_keys::chooses(&set) {
                 friction_keys::check_read(&table, &written, origin)?;
@@ -376,6 +385,7 @@ impl Scene {
             SceneBody::Settle(scene) => scene.check_together(origin),
             SceneBody::Grains(kind) => kind.check_together(origin),
             SceneBody::Collapse(scene) => scene.check_together(origin),
+            SceneBody::Cylinder(scene) => scene.check_together(origin),
         }
     }
 }
@@ -425,6 +435,7 @@ fn body(name: &str, table: &toml::Table) -> Result<SceneBody, String> {
             None => return Err(format!("no scene is called `{name}`")),
         },
         Family::Collapse => SceneBody::Collapse(table.try_into().map_err(plain)?),
+        Family::Cylinder => SceneBody::Cylinder(table.try_into().map_err(plain)?),
     })
 }
 
@@ -443,6 +454,7 @@ enum Family {
     Settle,
     Grains,
     Collapse,
+    Cylinder,
 }
 
 /// What a scene of this kind builds on. A `grains` scene stands for itself: walls and grains of the
@@ -462,6 +474,7 @@ fn family(name: &str) -> Family {
         "settle" => Family::Settle,
         _ if Kind::NAMES.contains(&name) => Family::Grains,
         "column-collapse" | "cliff-plain" => Family::Collapse,
+        "cylinder-collapse" => Family::Cylinder,
         _ => Family::Incline,
     }
 }
@@ -470,7 +483,7 @@ fn family(name: &str) -> Family {
 fn alternatives(name: &str) -> &'static [&'static [&'static str]] {
     match family(name) {
         Family::Incline => &INCLINE_CHOICES,
-        Family::Bagnold => rheology_file::ALTERNATIVES,
+        Family::Bagnold | Family::Cylinder => rheology_file::ALTERNATIVES,
         Family::Collapse => &COLLAPSE_CHOICES,
         Family::Impact | Family::Grains => &law::CHOICES,
         Family::Chute | Family::Settle => &BED_CHOICES,
@@ -527,6 +540,7 @@ fn body_schema(name: &str) -> Value {
         Family::Settle => schemars::schema_for!(SettleScene),
         Family::Grains => return Kind::schema(name).unwrap_or_default(),
         Family::Collapse => schemars::schema_for!(CollapseScene),
+        Family::Cylinder => schemars::schema_for!(CylinderScene),
     };
     schema.to_value()
 }

@@ -217,6 +217,15 @@ fn interrupted_collapse_on_terrain_goes_on_to_the_same_state() {
     });
 }
 
+#[test]
+fn interrupted_cylinder_goes_on_to_the_same_state() {
+    goes_on_to_the_same_state("run cylinder-collapse", |out| {
+        let mut list = vec!["run", "cylinder-collapse", "--out", out];
+        list.extend(["--set", "scale=0.5", "--set", "duration_scaled=3"]);
+        list
+    });
+}
+
 /// `begun` is what the log says when there is a run to stop.
 fn goes_on_to_the_same_state(begun: &str, arguments: impl Fn(&'static str) -> Vec<&'static str>) {
     let folder = tempfile::tempdir().unwrap();

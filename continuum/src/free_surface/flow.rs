@@ -8,6 +8,7 @@
 use serde::{Deserialize, Serialize};
 
 use super::faces::{ACTIVE, Face, Faces, ThinLayer};
+use super::fields::CellFields;
 use super::fraction::reconstruct;
 use super::ground::contact::sliding_place;
 use super::ground::faces::faces_over;
@@ -345,6 +346,8 @@ impl<R: Rheology> SurfaceFlow<R> {
 
 /// A flow with a moving surface in space.
 pub type SpaceFlow<R> = SurfaceFlow<R, 3, SPACE_COMPONENTS, SPACE_VELOCITIES>;
+/// Fields of a cell of a [`SpaceFlow`].
+pub type SpaceFields = CellFields<3, SPACE_COMPONENTS>;
 /// The state of a [`SpaceFlow`].
 pub type SpaceState = SurfaceState<3, SPACE_COMPONENTS>;
 
@@ -780,6 +783,8 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             .as_ref()
             .is_none_or(|(known, _)| *known != pattern)
         {
+            // The old factors make room first: in space they are most of the memory.
+            self.solver = None;
             self.solver = Some((
                 pattern,
                 PrimalDual::new(&discretisation, self.options.solver)?,

@@ -469,10 +469,15 @@ impl<const D: usize> Material<'_, D> {
         point: &mut QuadraturePoint<C, V>,
     ) {
         let axes = self.grid.axes();
+        // In space smooth walls are planes of symmetry, beyond which lies the same pressure.
         let wall = (0..D)
             .rev()
             .filter(|&axis| axis > 0 || self.inflow.is_none())
-            .find(|&axis| axes[axis].boundary_at(corner[axis]).is_some());
+            .find(|&axis| {
+                axes[axis]
+                    .boundary_at(corner[axis])
+                    .is_some_and(|side| D == 2 || side.wall_velocity().is_some())
+            });
         let count = self.cells_at_corner(corner).count() as f64;
         for cell in self.cells_at_corner(corner) {
             let share = 1.0 / count;

@@ -41,6 +41,9 @@ pub fn errors(scene: &Scene, run: &Path, reference: &Path) -> Result<Errors, Fai
             ("deposit".to_owned(), curve(run, reference, DEPOSIT)),
             ("front".to_owned(), result(run, reference, "x_front")?),
         ],
+        SceneBody::Cylinder(_) => {
+            vec![("front".to_owned(), result(run, reference, "runout_scaled")?)]
+        }
         SceneBody::Incline(ref body) if body.rheology.is_some() => [
             ("velocity", "u"),
             ("normal_stress", "sigma_zz"),
@@ -109,6 +112,9 @@ pub fn against_reference(scene: &Scene) -> String {
         }
         SceneBody::Collapse(_) => {
             "the reference run; the larger of the relative L2 error of the deposit's height and the relative error of the front".to_owned()
+        }
+        SceneBody::Cylinder(_) => {
+            "the reference run; relative error of the run-out".to_owned()
         }
         SceneBody::Incline(body) if body.rheology.is_some() => {
             "the reference run; largest relative L2 error through the depth of velocity, normal and shear stress".to_owned()

@@ -3,12 +3,15 @@
 mod beside_continuum;
 
 use super::bagnold::failure;
+use super::surface_steps::{FRONTS, PROFILES, Steps, columns, join_pictures, put_state, state_of};
 use super::{Findings, Under, collapse_ground, joined_column, world};
 use crate::cost::Cost;
 use crate::failure::Failure;
 use crate::frames;
 use crate::progress::Bar;
-use crate::scene::{CollapseModel, CollapseScene, LawVisitor, Scene, ThinLayerKind};
+use crate::scene::{
+    CollapseModel, CollapseScene, CollapseSolver, LawVisitor, Scene, ThinLayerKind,
+};
 use crate::state_hash;
 use crate::summary::{Model, Quantity, Summary};
 use crate::table::Table;
@@ -29,12 +32,6 @@ pub const LEFT_OUT: [&str; 5] = [
     "the third dimension",
     "non-local effects near the base",
 ];
-/// Instants of the front over the duration.
-const FRONTS: f64 = 240.0;
-/// Instants of the profile over the duration.
-const PROFILES: f64 = 24.0;
-/// Steps at rest after which a run ends.
-const REST_STEPS: u64 = 3;
 
 /// The case that a scene describes, of a material with this law.
 pub fn case<L>(scene: &CollapseScene, rheology: L) -> CollapseCase<L> {
@@ -62,17 +59,25 @@ fn walls(scene: &CollapseScene) -> Option<SideWalls> {
 
 /// The solver's settings that a scene describes.
 pub fn options(scene: &CollapseScene) -> SurfaceOptions {
+    options_of(&scene.solver)
+}
+
+/// The solver's settings.
+pub(super) fn options_of(keys: &CollapseSolver) -> SurfaceOptions {
     let mut options = SurfaceOptions {
-        courant: scene.solver.courant,
-        largest_step: scene.solver.largest_step_scaled,
-        thin_layer: match scene.solver.thin_layer {
+        courant: keys.courant,
+        largest_step: keys.largest_step_scaled,
+        thin_layer: match keys.thin_layer {
             ThinLayerKind::DepthAveraged => ThinLayer::DepthAveraged,
             ThinLayerKind::Frozen => ThinLayer::Frozen,
             ThinLayerKind::Following => ThinLayer::Following,
         },
         ..SurfaceOptions::default()
     };
-    options.solver.strain_rate_floor = scene.solver.strain_rate_floor;
+    options.solver.strain_rate_floor = keys.strain_rate_floor;
+    if let Some(tolerance) = keys.linear_tolerance {
+        options.solver.linear_tolerance = tolerance;
+    }
     options
 }
 
@@ -139,32 +144,10 @@ struct Course {
     profiles: [Vec<f64>; 3],
     /// Time, share of the volume that flows, and that flows where the equations are ill posed.
     flowing: [Vec<f64>; 3],
-    last: SurfaceStep,
-    /// Steps, Newton iterations, cuts, cell-steps and steps at rest.
-    counts: [u64; 5],
-    /// Largest residuals of momentum, divergence and stress of any step.
-    residuals: [f64; 3],
+    steps: Steps,
 }
 
 impl Course {
-    fn book(&mut self, step: &SurfaceStep, at_rest: bool) {
-        let [steps, iterations, cuts, cell_steps, resting] = &mut self.counts;
-        *steps += 1;
-        *iterations += step.newton_iterations as u64;
-        *cuts += step.cuts as u64;
-        *cell_steps += step.active_cells as u64;
-        *resting = if at_rest { *resting + 1 } else { 0 };
-        let r = &step.residuals;
-        for (most, now) in self
-            .residuals
-            .iter_mut()
-            .zip([r.momentum, r.divergence, r.stress])
-        {
-            *most = most.max(now);
-        }
-        self.last = *step;
-    }
-
     /// Takes the front down, once an instant: a run may end at one that was just seen.
     fn see_front<L: ShearLaw + Clone>(&mut self, collapse: &Collapse<L>, threshold: f64) {
         let front = collapse.front(threshold);
@@ -190,18 +173,9 @@ impl Course {
         let mut put = |name: &str, values: Vec<f64>| {
             record.numbers.insert(name.to_owned(), values);
         };
-        put("fractions", state.fractions.clone());
         if !self.ground.is_empty() {
             put("ground", self.ground.clone());
         }
-        put("velocity/x", state.velocity[0].clone());
-        put("velocity/z", state.velocity[1].clone());
-        put("pressure", state.pressure.clone());
-        put("stress", state.stress.iter().flatten().copied().collect());
-        put(
-            "time",
-            vec![state.time, state.velocity_time, state.next_step],
-        );
         let fronts = self.fronts.iter();
         put(
             "course/fronts",
@@ -211,40 +185,16 @@ impl Course {
         );
         put("course/profiles", self.profiles.concat());
         put("course/flowing", self.flowing.concat());
-        put("course/residuals", self.residuals.to_vec());
-        put("course/step", vec![self.last.dt, self.last.max_speed]);
-        record
-            .counts
-            .insert("steps".into(), vec![state.steps as u64]);
-        record
-            .counts
-            .insert("course/counts".into(), self.counts.to_vec());
+        self.steps.put_into(&mut record);
+        put_state(state, &mut record);
         record
     }
 
     fn restored(record: &Record) -> Option<(Course, SurfaceState)> {
         let numbers = |name: &str| record.numbers.get(name).cloned();
-        let time = numbers("time")?;
-        let stress = numbers("stress")?;
-        let state = SurfaceState {
-            fractions: numbers("fractions")?,
-            velocity: [numbers("velocity/x")?, numbers("velocity/z")?],
-            pressure: numbers("pressure")?,
-            stress: stress.chunks_exact(2).map(|s| [s[0], s[1]]).collect(),
-            time: *time.first()?,
-            velocity_time: *time.get(1)?,
-            next_step: *time.get(2)?,
-            steps: *record.counts.get("steps")?.first()? as usize,
-            ..SurfaceState::default()
-        };
         let fronts = numbers("course/fronts")?;
         let profiles = numbers("course/profiles")?;
         let flowing = numbers("course/flowing")?;
-        let thirds = |all: &[f64]| {
-            let rows = all.len() / 3;
-            [0, 1, 2].map(|n| all[n * rows..(n + 1) * rows].to_vec())
-        };
-        let step = numbers("course/step")?;
         let course = Course {
             ground: numbers("ground").unwrap_or_default(),
             fronts: fronts
@@ -255,22 +205,11 @@ impl Course {
                     height: f[2],
                 })
                 .collect(),
-            profiles: thirds(&profiles),
-            flowing: thirds(&flowing),
-            last: SurfaceStep {
-                dt: *step.first()?,
-                max_speed: *step.get(1)?,
-                ..SurfaceStep::default()
-            },
-            counts: record
-                .counts
-                .get("course/counts")?
-                .clone()
-                .try_into()
-                .ok()?,
-            residuals: numbers("course/residuals")?.try_into().ok()?,
+            profiles: columns(&profiles),
+            flowing: columns(&flowing),
+            steps: Steps::of(record)?,
         };
-        Some((course, state))
+        Some((course, state_of(record)?))
     }
 }
 
@@ -339,13 +278,13 @@ fn continuum<L: ShearLaw + Clone>(
         picture(under, scene, &collapse, 0)?;
     }
     let bar = Bar::new(&under.scene.name);
-    while collapse.time() < end * (1.0 - 1e-9) && course.counts[4] < REST_STEPS {
+    while collapse.time() < end * (1.0 - 1e-9) && !course.steps.rest() {
         // Steps end at the instants of the tables, whenever a run was begun or resumed.
         let next = (collapse.time() / end * FRONTS + 1e-6).floor() + 1.0;
         let step = collapse
             .step((next / FRONTS * end).min(end))
             .map_err(failure)?;
-        course.book(&step, collapse.is_at_rest(&step));
+        course.steps.book(&step, collapse.is_at_rest(&step));
         if (collapse.time() / end * FRONTS - next).abs() < 1e-6 {
             course.see_front(&collapse, threshold);
             if (next * PROFILES / FRONTS).fract() < 1e-6 {
@@ -364,12 +303,9 @@ fn continuum<L: ShearLaw + Clone>(
     bar.clear();
     let wall_s = under.wall_s();
     course.see_front(&collapse, threshold);
-    join_pictures(
-        under,
-        scene,
-        &collapse,
-        (collapse.time() / end * FRONTS + 1e-6) as u64,
-    )?;
+    join_pictures(under, collapse.time() / end, |last| {
+        picture(under, scene, &collapse, last)
+    })?;
     let mut summary = Summary::begun(&under.scene.name, "run");
     describe(&mut summary, scene, &collapse, &course, wall_s);
     Ok(Findings {
@@ -388,22 +324,6 @@ fn picture<L: ShearLaw + Clone>(
 ) -> Result<(), Failure> {
     let frame = fields(scene, collapse);
     frames::put(under.directory.path(), frames::FIELDS, instant, frame)
-}
-
-/// Joins the fields at all instants of the profile up to the last one of the front, and those of the end.
-fn join_pictures<L: ShearLaw + Clone>(
-    under: &Under,
-    scene: &CollapseScene,
-    collapse: &Collapse<L>,
-    last: u64,
-) -> Result<(), Failure> {
-    let every = (FRONTS / PROFILES) as u64;
-    let mut numbers: Vec<u64> = (0..=last).step_by(every as usize).collect();
-    if !last.is_multiple_of(every) {
-        picture(under, scene, collapse, last)?;
-        numbers.push(last);
-    }
-    frames::join(under.directory.path(), frames::FIELDS, &numbers)
 }
 
 /// Cells with material as quadrilaterals in the plane y = 0, then the ground under each column of cells
@@ -514,11 +434,11 @@ fn describe<L: ShearLaw + Clone>(
 ) {
     let units = collapse.units();
     let state = collapse.flow().state();
-    let [steps, iterations, cuts, cell_steps, resting] = course.counts;
+    let [_, cell_steps] = course.steps.work();
     summary.model = Model {
         grains: 0,
         cells: state.fractions.len() as u64,
-        dt_s: course.last.dt * units.time(),
+        dt_s: course.steps.last.dt * units.time(),
         dt_limit: "courant, with solver.largest_step_scaled".into(),
         left_out: LEFT_OUT.map(String::from).to_vec(),
     };
@@ -556,19 +476,13 @@ fn describe<L: ShearLaw + Clone>(
     );
     put(
         "time_of_rest",
-        if resting >= REST_STEPS {
+        if course.steps.rest() {
             collapse.time()
         } else {
             f64::NAN
         },
         "s",
         "speeds below 5 ε height; null where the run ended before",
-    );
-    put(
-        "largest_speed",
-        speed(collapse, &course.last),
-        "m/s",
-        "at the end",
     );
     let [_, flowing, ill_posed] = &course.flowing;
     let most = |shares: &[f64]| shares.iter().copied().fold(0.0, f64::max);
@@ -584,38 +498,10 @@ fn describe<L: ShearLaw + Clone>(
         "1",
         "of the volume: flows where short waves grow without bound, C(I) > 0",
     );
-    put("steps", steps as f64, "1", "");
-    put(
-        "newton_iterations",
-        iterations as f64,
-        "1",
-        "failed attempts included",
-    );
-    put("steps_cut", cuts as f64, "1", "halved and tried again");
-    let [momentum, divergence, stress] = course.residuals;
-    put(
-        "momentum_residual",
-        momentum,
-        "1",
-        "largest of any step, over gravity",
-    );
-    put(
-        "divergence_residual",
-        divergence,
-        "1",
-        "largest of any step, over √(gravity/height)",
-    );
-    put(
-        "stress_residual",
-        stress,
-        "1",
-        "largest of any step, relative",
-    );
-    put(
-        "strain_rate_floor",
+    course.steps.describe(
+        summary,
+        speed(collapse, &course.steps.last),
         scene.solver.strain_rate_floor / units.time(),
-        "1/s",
-        "at which rigid matter creeps",
     );
     let (x, _) = collapse.profile();
     if front.position >= x.last().copied().unwrap_or(0.0) {

@@ -117,6 +117,10 @@ pub struct CollapseSolver {
     pub strain_rate_floor: f64,
     /// How layers thinner than half a cell move over the floor.
     pub thin_layer: ThinLayerKind,
+    /// Relative residual to which the linear system of an iteration is solved; 1e-3 where it is left out.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minimum" = 1.0e-12, "maximum" = 0.1))]
+    pub linear_tolerance: Option<f64>,
 }
 
 /// How layers thinner than half a cell move over the floor.
@@ -141,14 +145,8 @@ impl CollapseScene {
     }
 
     pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {
-        let refused = |key: &str, value: String, range: String| {
-            Err(SceneError::OutOfRange {
-                file: origin.to_owned(),
-                key: key.into(),
-                value,
-                range,
-            })
-        };
+        let refused =
+            |key: &str, value: String, range: String| Err(out_of_range(origin, key, value, range));
         match self.model {
             CollapseModel::Hybrid => return self.check_zones(origin),
             CollapseModel::Dem => return self.check_grains(origin),
@@ -176,25 +174,41 @@ impl CollapseScene {
                 );
             }
         }
-        let r = &self.rheology;
-        if let Some([low, high]) = r.valid_i.as_deref()
-            && low >= high
-        {
-            return refused(
-                "rheology.valid_i",
-                format!("[{low}, {high}]"),
-                "[low, high] with low < high".into(),
-            );
-        }
-        if let (Some(mu_s), Some(mu_2)) = (r.mu_s, r.mu_2)
-            && mu_2 < mu_s
-        {
-            return refused(
-                "rheology.mu_2",
-                mu_2.to_string(),
-                format!("at least rheology.mu_s = {mu_s}"),
-            );
-        }
-        Ok(())
+        check_rheology(&self.rheology, origin)
     }
+}
+
+/// A value that is not allowed.
+pub(super) fn out_of_range(origin: &str, key: &str, value: String, range: String) -> SceneError {
+    SceneError::OutOfRange {
+        file: origin.to_owned(),
+        key: key.into(),
+        value,
+        range,
+    }
+}
+
+/// Refuses laws under which nothing can collapse.
+pub(super) fn check_rheology(r: &RheologyKeys, origin: &str) -> Result<(), SceneError> {
+    let refused =
+        |key: &str, value: String, range: String| Err(out_of_range(origin, key, value, range));
+    if let Some([low, high]) = r.valid_i.as_deref()
+        && low >= high
+    {
+        return refused(
+            "rheology.valid_i",
+            format!("[{low}, {high}]"),
+            "[low, high] with low < high".into(),
+        );
+    }
+    if let (Some(mu_s), Some(mu_2)) = (r.mu_s, r.mu_2)
+        && mu_2 < mu_s
+    {
+        return refused(
+            "rheology.mu_2",
+            mu_2.to_string(),
+            format!("at least rheology.mu_s = {mu_s}"),
+        );
+    }
+    Ok(())
 }

@@ -135,5 +135,6 @@ pub fn read<'a>(take: &mut impl FnMut() -> Option<&'a [f64]>) -> Option<SurfaceS
         velocity_time,
         next_step,
         steps: steps as usize,
+        ..SurfaceState::default()
     })
 }

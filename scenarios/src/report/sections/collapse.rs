@@ -9,11 +9,20 @@ use maud::{Markup, html};
 /// Profiles drawn, beside the deposit.
 const CURVES: usize = 6;
 
+/// Along what profiles go: x, or the distance r from the axis of a cylinder.
+fn along(table: &Table) -> &'static str {
+    if table.column("r").is_empty() {
+        "x"
+    } else {
+        "r"
+    }
+}
+
 /// The profiles (t, x, h) as they follow each other in the table, h on top of the ground if there is any.
 fn instants(table: &Table) -> Vec<(f64, Vec<(f64, f64)>)> {
     let mut instants: Vec<(f64, Vec<(f64, f64)>)> = Vec::new();
     let ground = table.column("z_ground").iter().copied();
-    let rows = table.column("t").iter().zip(table.pairs("x", "h"));
+    let rows = table.column("t").iter().zip(table.pairs(along(table), "h"));
     for ((&time, (x, h)), ground) in rows.zip(ground.chain(std::iter::repeat(0.0))) {
         let point = (x, h + ground);
         match instants.last_mut() {
@@ -28,7 +37,7 @@ fn instants(table: &Table) -> Vec<(f64, Vec<(f64, f64)>)> {
 fn at_start(table: &Table, column: &str) -> Vec<(f64, f64)> {
     let first = table.column("t").first().copied();
     let times = table.column("t").iter();
-    let points = times.zip(table.pairs("x", column));
+    let points = times.zip(table.pairs(along(table), column));
     points
         .take_while(|(time, _)| Some(**time) == first)
         .map(|(_, point)| point)
@@ -41,7 +50,10 @@ pub(super) fn collapse(profiles: &Table, front: Option<&Table>) -> Markup {
     let every = instants.len().div_ceil(CURVES).max(1);
     let ground: Vec<(f64, f64)> = at_start(profiles, "z_ground");
     let mut shapes = if ground.is_empty() {
-        Plot::new("x [m]", "height of the heap h [m]")
+        Plot::new(
+            &format!("{} [m]", along(profiles)),
+            "height of the heap h [m]",
+        )
     } else {
         Plot::new("x [m]", "height z [m]")
     };
@@ -63,8 +75,9 @@ pub(super) fn collapse(profiles: &Table, front: Option<&Table>) -> Markup {
         div.figures {
             (figure(&shapes.svg(WIDTH, HEIGHT), "Profiles through time, heights and lengths not to the same scale."))
             @if let Some(front) = front {
+                @let front_column = if along(profiles) == "r" { "r_front" } else { "x_front" };
                 @let plot = Plot::new("time t [s]", "position, height [m]")
-                    .with("front", Mark::Line, 0, front.pairs("t", "x_front"))
+                    .with("front", Mark::Line, 0, front.pairs("t", front_column))
                     .with("greatest height", Mark::Line, 1, front.pairs("t", "height"));
                 (figure(&plot.svg(WIDTH, HEIGHT), "The front, where the heap is as high as front_height_scaled asks, and its greatest height."))
             }

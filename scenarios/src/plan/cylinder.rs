@@ -1,0 +1,57 @@
+//! The plan of the collapse of a cylinder.
+
+use super::Lines;
+use crate::run;
+use crate::scene::CylinderScene;
+
+/// Peak memory for each cell with a pressure (bytes), as measured with a thousand of them.
+const MEMORY_PER_CELL: f64 = 2.0e5;
+
+pub(super) fn cylinder(body: &CylinderScene) -> String {
+    let mut lines = Lines::default();
+    let case = run::cylinder::case(body);
+    let units = case.units();
+    let spacing = body.grid.length_scaled * body.height / case.cells as f64;
+    let filled = body.filled();
+    lines.say(
+        "scene",
+        &format!(
+            "cylinder-collapse: a cylinder {} m high, {:.4} m in radius, on a rough floor, in space; {} of it is computed",
+            body.height,
+            case.radius(),
+            if body.grid.whole { "the whole" } else { "a quarter" }
+        ),
+    );
+    lines.say_rheology(&body.rheology);
+    lines.say(
+        "grid",
+        &format!(
+            "{} cubes of {spacing:.4e} m from the axis to the edge; {filled:.0} cells hold material, and they cost most",
+            case.cells
+        ),
+    );
+    lines.say("left out", &run::cylinder::LEFT_OUT.join(", "));
+    for remark in body.rheology.remarks() {
+        lines.say("warning", &remark);
+    }
+    let largest = body.solver.largest_step_scaled * units.time();
+    // Fronts move at about √(g H).
+    let step = (body.solver.courant * spacing / units.velocity).min(largest);
+    lines.say(
+        "time step",
+        &format!(
+            "about {step:.4e} s while the front moves at √(g H) = {:.3} m/s (courant {}), {largest:.4e} s at rest",
+            units.velocity, body.solver.courant
+        ),
+    );
+    let steps = body.duration_scaled * units.time() / step;
+    lines.say(
+        "cost",
+        &format!(
+            "at most {steps:.0} steps, {:.2e} cell-steps, about {:.2} GB",
+            steps * filled,
+            filled * MEMORY_PER_CELL / 1e9
+        ),
+    );
+    lines.0
+}

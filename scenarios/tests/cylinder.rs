@@ -1,0 +1,99 @@
+//! The collapse of a cylinder in space, from the command line.
+
+#![allow(clippy::unwrap_used)] // a test may panic
+
+mod command;
+
+use colluvium::vtkhdf;
+use command::{colluvium, succeed, summary, table, value};
+
+#[test]
+fn cylinder_writes_front_deposit_and_fields() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = ["run", "cylinder-collapse", "--out", "c"];
+    succeed(folder.path(), &[&run[..], &["--set", "scale=0.6"]].concat());
+    let at = |name: &str| folder.path().join("c").join(name);
+    let (header, fronts) = table(&at("front.csv"));
+    assert_eq!(header, ["t", "r_front", "height", "r_axis", "r_diagonal"]);
+    // It stands at first, 0.1 m in radius and in height, and does not run back.
+    assert!(fronts.len() > 50 && fronts[0][0] == 0.0);
+    // The edge of a grid of 14 cells is known to a cell, a fifth of the radius.
+    assert!((fronts[0][1] / 0.1 - 1.0).abs() < 0.25 && (fronts[0][2] / 0.1 - 1.0).abs() < 1e-9);
+    for pair in fronts.windows(2) {
+        assert!(pair[1][0] > pair[0][0] && pair[1][1] > pair[0][1] - 0.003);
+    }
+    let (header, deposit) = table(&at("deposit.csv"));
+    assert_eq!(header, ["r", "h"]);
+    // Rings one cell wide, of a heap that falls outwards.
+    assert!(deposit.windows(2).all(|pair| pair[1][0] > pair[0][0]));
+    assert!(
+        deposit
+            .windows(2)
+            .all(|pair| pair[1][1] < pair[0][1] + 1e-3)
+    );
+    let found = summary(&folder.path().join("c"));
+    assert_eq!(found["status"], "done");
+    let runout = value(&found, "runout_over_aspect");
+    assert!((0.93..1.69).contains(&runout), "{runout}");
+    // On this grid 1.3e-2 of a cell, however far the systems are solved.
+    assert!(value(&found, "symmetry_error") < 0.03);
+    assert!(value(&found, "volume_error").abs() < 1e-12);
+    // In units of √(height/gravity); experiments say 3.
+    let time = value(&found, "time_of_rest") / (0.1_f64 / 9.81).sqrt();
+    assert!((2.0..6.0).contains(&time), "{time}");
+    assert!(value(&found, "memory_per_cell") > 0.0 && value(&found, "time_per_cell_step") > 0.0);
+    let report = std::fs::read_to_string(at("report.html")).unwrap();
+    assert!(report.contains("Profiles through time") && report.contains("r [m]"));
+    // A quarter of the cylinder's volume lies in the cells of every instant.
+    let frames = vtkhdf::read_series(&at("fields.vtkhdf")).unwrap();
+    let quarter = 0.25 * std::f64::consts::PI * 1e-3;
+    assert!(frames.len() > 5);
+    for frame in &frames {
+        let scalars = |name: &str| {
+            let field = frame.fields.iter().find(|f| f.name == name).unwrap();
+            let vtkhdf::Values::Scalars(values) = &field.values else {
+                panic!("{name} is not a number a cell")
+            };
+            values
+        };
+        let sizes = scalars("cell_size").iter();
+        let volume: f64 = sizes
+            .zip(scalars("fraction"))
+            .map(|(size, fraction)| size.powi(3) * fraction)
+            .sum();
+        assert!((volume / quarter - 1.0).abs() < 1e-2, "{volume} {quarter}");
+    }
+}
+
+#[test]
+fn cylinders_are_planned_and_bad_ones_refused_by_key() {
+    let folder = tempfile::tempdir().unwrap();
+    let planned = colluvium(folder.path(), &["plan", "cylinder-collapse"]);
+    let planned = String::from_utf8_lossy(&planned.stdout).into_owned();
+    assert!(
+        planned.contains("a quarter of it") && planned.contains("cell-steps"),
+        "{planned}"
+    );
+    for (set, key, allowed) in [
+        (
+            "grid.length_scaled=0.9",
+            "grid.length_scaled",
+            "greater than",
+        ),
+        ("grid.cells=500", "grid.cells", "at most 40000"),
+        ("grid.cells=8", "grid.cells", "at least"),
+        ("rheology.mu_2=0.1", "rheology.mu_2", "at least"),
+        ("solver.courant=2", "solver.courant", "1"),
+        ("grid.hole=true", "grid.hole", "whole"),
+    ] {
+        let arguments = ["run", "cylinder-collapse", "--out", "x", "--set", set];
+        let refused = colluvium(folder.path(), &arguments);
+        assert_eq!(refused.status.code(), Some(2), "{set}");
+        let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert!(
+            message.contains(key) && message.contains(allowed),
+            "{set}: {message}"
+        );
+        assert!(!folder.path().join("x").exists());
+    }
+}
