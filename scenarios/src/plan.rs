@@ -34,10 +34,9 @@ pub fn plan(scene: &Scene) -> Result<String, Failure> {
         SceneBody::Collapse(body) if body.model == CollapseModel::Dem => {
             world::plan(scene, body.as_ref())
         }
-        SceneBody::Collapse(body) if body.model == CollapseModel::Hybrid => world::plan(
-            scene,
-            &run::joined_column::JoinedColumn::new(body, &scene.origin),
-        ),
+        SceneBody::Collapse(body) if body.model == CollapseModel::Hybrid => {
+            run::joined_column::with_edge(body, &scene.origin, |column| world::plan(scene, column))
+        }
         SceneBody::Collapse(body) => {
             let ground = run::collapse_ground::ground(body, &scene.origin)?;
             Ok(collapse::collapse(body, ground.as_ref()))

@@ -114,6 +114,13 @@ fn bad_joined_columns_are_refused_by_key() {
             "for this column",
         ),
         (&["zones.edges=1"], "zones.edges", "edge_scaled"),
+        (
+            &["zones.edge_scaled=1", "zones.tolerance=0.05"],
+            "zones.edge_scaled",
+            "the oracle puts the edge",
+        ),
+        (&["zones.budget=1000"], "zones.budget", "zones.tolerance"),
+        (&["zones.tolerance=1e-9"], "zones.tolerance", "at least"),
         (&["overhang_degrees=10"], "overhang_degrees", "upright"),
         (
             &["overlap.shell_diameters=5"],
@@ -163,4 +170,38 @@ fn the_plan_says_where_grains_end_and_why() {
     ] {
         assert!(said.contains(word), "{word}: {said}");
     }
+}
+
+/// Share of the grain-steps that a plan predicts (%).
+fn predicted(said: &str) -> f64 {
+    let before = said.split(" % of the grain-steps").next().unwrap();
+    let number = before.rsplit(|c: char| !c.is_ascii_digit()).next();
+    number.unwrap().parse().unwrap()
+}
+
+/// The oracle puts the edge, tells its reasons, and leaves fewer grains where it may be wrong about more strain or
+/// has a budget.
+#[test]
+fn the_oracle_puts_the_edge() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = |sets: &[&str]| {
+        let mut plan = arguments("x", sets);
+        plan[0] = "plan";
+        plan.drain(2..4);
+        succeed(folder.path(), &plan)
+    };
+    let (strict, lax) = (
+        said(&["zones.tolerance=0.1"]),
+        said(&["zones.tolerance=0.4"]),
+    );
+    println!("{strict}\n{lax}");
+    for concern in ["by the oracle", "window", "thickness", "wall"] {
+        assert!(strict.contains(concern), "{strict}");
+    }
+    assert!(predicted(&lax) < predicted(&strict), "{lax}");
+    let poor = said(&["zones.tolerance=0.1", "zones.budget=700"]);
+    println!("{poor}");
+    assert!(poor.contains("raised from 0.1"), "{poor}");
+    assert!(predicted(&poor) < predicted(&strict), "{poor}");
+    assert!(!folder.path().join("x").exists());
 }

@@ -25,6 +25,8 @@ use crate::wall_friction::{PointLaw, SideWalls};
 const NEAREST_SURFACE: f64 = 0.005;
 /// Smallest θ in the extrapolation of pressure beyond the surface.
 pub(super) const NEAREST_EXTRAPOLATION: f64 = 0.25;
+/// Ways from a cell to those beside it, in space.
+const MOST_WAYS: usize = 6;
 /// Cells with less material have no quadrature points.
 pub(super) const EMPTY: f64 = 1e-9;
 /// Most quadrature points of a cell: fewer along flat axes.
@@ -433,24 +435,25 @@ impl<const D: usize> Material<'_, D> {
         (self.faces.pressure[inner], (distance - 1.0) / distance)
     }
 
-    /// The same pressure where two ways may be alike, as on the diagonal of what mirrors itself there: the
-    /// mean of both.
-    fn pressures_at(&self, cell: usize, nearest: f64) -> [Option<(usize, f64)>; 2] {
-        let one = self.pressure_at(cell, nearest);
+    /// The same pressure where several ways may be alike, as on the diagonal of what mirrors itself there: the
+    /// mean of all.
+    fn pressures_at(&self, cell: usize, nearest: f64) -> [Option<(usize, f64)>; MOST_WAYS] {
+        let mut all = [None; MOST_WAYS];
         if D == 2 || self.faces.pressure[cell] != NONE {
-            return [one, None];
+            all[0] = self.pressure_at(cell, nearest);
+            return all;
         }
         let most = self.ways_inside(cell).map(|way| way.0).fold(0.0, f64::max);
-        let mut alike = self
-            .ways_inside(cell)
-            .filter(|way| most - way.0 <= ALIKE * most);
-        match (alike.next(), alike.next(), alike.next()) {
-            (Some(a), Some(b), None) => [a, b].map(|way| {
-                let (p, factor) = self.extrapolated(cell, way, nearest);
-                Some((p, 0.5 * factor))
-            }),
-            _ => [one, None],
+        let alike = || {
+            self.ways_inside(cell)
+                .filter(|way| most - way.0 <= ALIKE * most)
+        };
+        let share = 1.0 / alike().count() as f64;
+        for (slot, way) in all.iter_mut().zip(alike()) {
+            let (p, factor) = self.extrapolated(cell, way, nearest);
+            *slot = Some((p, share * factor));
         }
+        all
     }
 
     /// What the pressure on a surface that is not free adds to the one extrapolated through it into a cell, by

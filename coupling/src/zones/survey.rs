@@ -59,12 +59,21 @@ impl Survey {
         edge
     }
 
-    /// The least tolerance at which no more than a share of the material has to be grains.
-    pub fn tolerance_within(&self, share: f64, forgiven: f64) -> f64 {
+    /// The least tolerance whose edge lies at x (m) or beyond it.
+    pub fn tolerance_for(&self, x: f64, forgiven: f64) -> f64 {
         let mut levels: Vec<f64> = self.rows.iter().map(|r| r[2]).collect();
+        levels.push(0.0);
         levels.sort_by(f64::total_cmp);
-        let at = levels.partition_point(|&t| self.share_beyond(self.edge(t, forgiven)) > share);
+        let at = levels.partition_point(|&t| self.edge(t, forgiven) < x);
         levels.get(at).or(levels.last()).copied().unwrap_or(0.0)
+    }
+
+    /// The x (m) beyond which at most a share of all material lay at the start.
+    pub fn place_of_share(&self, share: f64) -> f64 {
+        let at = self
+            .rows
+            .partition_point(|r| self.share_beyond(r[0]) > share);
+        self.rows.get(at).or(self.rows.last()).map_or(0.0, |r| r[0])
     }
 }
 
@@ -96,10 +105,11 @@ mod tests {
     #[test]
     fn a_budget_raises_the_tolerance() {
         let survey = survey();
-        let tolerance = survey.tolerance_within(0.25, 0.0);
-        let beyond = survey.share_beyond(survey.edge(tolerance, 0.0));
-        assert!(beyond <= 0.25, "{beyond}");
-        assert_eq!(tolerance, 7.5);
-        assert_eq!(survey.tolerance_within(1.0, 0.0), 0.0);
+        let place = survey.place_of_share(0.25);
+        assert!(survey.share_beyond(place) <= 0.25);
+        let tolerance = survey.tolerance_for(place, 0.0);
+        assert!(survey.edge(tolerance, 0.0) >= place, "{tolerance}");
+        assert_eq!((place, tolerance), (7.5, 7.5));
+        assert_eq!(survey.tolerance_for(6.0, 0.0), 0.0);
     }
 }

@@ -6,6 +6,7 @@
 //! in the same way.
 
 mod findings;
+mod oracle;
 
 use super::column_of_grains::{BEGUN, FRONTS, PROFILE_EVERY, STILL, STILL_LOOKS};
 use super::heap::{HeapCourse, edge};
@@ -31,6 +32,8 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 pub struct JoinedColumn<'a> {
     scene: &'a CollapseScene,
     origin: String,
+    /// What the oracle says of the edge, if it was asked, in words and by place.
+    oracle: Option<(String, Table)>,
     live: Mutex<Option<Live>>,
 }
 
@@ -55,20 +58,48 @@ const HEAD: usize = 2;
 
 /// Checks the scene before anything is written.
 pub(super) fn check(scene: &Scene, body: &CollapseScene) -> Result<(), Failure> {
-    let column = JoinedColumn::new(body, &scene.origin);
-    let named = |why: String| Failure::Input(format!("{}: {why}", scene.origin));
-    let spec = column.spec(crate::scene::DENSE)?;
-    spec.case.validate().map_err(|why| named(why.to_string()))?;
-    spec.options
-        .validate()
-        .map_err(|why| named(why.to_string()))?;
-    super::world::course::check(scene, &column)
+    with_edge(body, &scene.origin, |column| {
+        let named = |why: String| Failure::Input(format!("{}: {why}", scene.origin));
+        let spec = column.spec(crate::scene::DENSE)?;
+        spec.case.validate().map_err(|why| named(why.to_string()))?;
+        spec.options
+            .validate()
+            .map_err(|why| named(why.to_string()))?;
+        super::world::course::check(scene, column)
+    })
 }
 
 /// Runs it.
 pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, Failure> {
-    let column = JoinedColumn::new(scene, &under.scene.origin);
-    super::world::course::run(&column, under)
+    let origin = under.scene.origin.clone();
+    with_edge(scene, &origin, |column| {
+        let mut findings = super::world::course::run(column, under)?;
+        if let Some((words, table)) = &column.oracle {
+            findings.summary.remarks.push(format!("Edge {words}."));
+            findings.summary.figures.push(oracle::figure());
+            findings.tables.push(table.clone());
+        }
+        Ok(findings)
+    })
+}
+
+/// Does something with the column, whose edge the oracle has put if it is to.
+///
+/// # Errors
+/// What the oracle refuses, and what is done with the column fails with.
+pub fn with_edge<T>(
+    body: &CollapseScene,
+    origin: &str,
+    act: impl FnOnce(&JoinedColumn<'_>) -> Result<T, Failure>,
+) -> Result<T, Failure> {
+    match oracle::survey(body, origin)? {
+        None => act(&JoinedColumn::new(body, origin)),
+        Some(surveyed) => {
+            let mut column = JoinedColumn::new(&surveyed.scene, origin);
+            column.oracle = Some((surveyed.words, surveyed.table));
+            act(&column)
+        }
+    }
 }
 
 /// What an error of the coupling means for the process.
@@ -87,6 +118,7 @@ impl<'a> JoinedColumn<'a> {
         Self {
             scene,
             origin: origin.to_owned(),
+            oracle: None,
             live: Mutex::new(None),
         }
     }
@@ -114,6 +146,15 @@ impl<'a> JoinedColumn<'a> {
             grain_density: scene.grains.density,
             cohesion: 0.0,
         })
+    }
+
+    /// Where the law was measured, and the covariance of its numbers, as far as they are known.
+    fn validity(&self) -> Result<(Option<[f64; 2]>, Option<[[f64; 3]; 3]>), Failure> {
+        let Some(word) = self.scene.grains.calibrated.word() else {
+            return Ok((None, None));
+        };
+        let file = RheologyFile::read(Path::new(word))?;
+        Ok((file.valid_i, file.covariance))
     }
 
     /// What the column is joined from, at a solid fraction.

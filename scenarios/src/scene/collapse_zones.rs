@@ -14,6 +14,15 @@ pub struct ColumnZoneKeys {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 50.0))]
     pub edge_scaled: Option<f64>,
+    /// The edge by the oracle instead: a run of the continuum alone comes first, and material that makes more strain
+    /// than this under a friction in doubt is grains.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 100.0))]
+    pub tolerance: Option<f64>,
+    /// Most grains that the oracle may leave; where it needs more, the tolerance is raised, and the plan says so.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minimum" = 1, "maximum" = 1.0e9))]
+    pub budget: Option<u64>,
 }
 
 /// The overlap of both, from the edge into the grains. What is left out is computed; `colluvium plan` says it.
@@ -153,6 +162,15 @@ impl CollapseScene {
         })
     }
 
+    /// Where the edge may lie with an overlap so wide (m).
+    pub fn edge_range(&self, overlap: f64) -> [f64; 2] {
+        let d = self.grains.diameter;
+        [
+            (LEAST_CONTINUUM * d).max(2.0 * self.spacing()),
+            self.width() - overlap - LEAST_GRAINS * d,
+        ]
+    }
+
     /// What a joined column needs beyond one of grains.
     pub(super) fn check_zones(&self, origin: &str) -> Result<(), SceneError> {
         self.check_grains(origin)?;
@@ -164,8 +182,7 @@ impl CollapseScene {
         let settings = self.overlap_settings(origin)?;
         let (d, h) = (self.grains.diameter, self.height);
         let overlap = settings.inner + settings.buffer;
-        let least = (LEAST_CONTINUUM * d).max(2.0 * self.spacing()) / h;
-        let most = (self.width() - overlap - LEAST_GRAINS * d) / h;
+        let [least, most] = self.edge_range(overlap).map(|x| x / h);
         if least >= most {
             let range = format!(
                 "smaller: a column of width {:.4} m has no room for {:.4} m of continuum, an overlap of {overlap:.4} m and {:.4} m of \
@@ -176,6 +193,18 @@ impl CollapseScene {
                 least * h + overlap + LEAST_GRAINS * d
             );
             return Err(at("").refuse("aspect", self.aspect, &range));
+        }
+        let zones = &self.zones;
+        if zones.budget.is_some() && zones.tolerance.is_none() {
+            let range = "a budget of the oracle, whose zones.tolerance is to be given with it";
+            return Err(at("zones").refuse("budget", zones.budget.unwrap_or(0), range));
+        }
+        if let (Some(_), Some(edge)) = (zones.tolerance, zones.edge_scaled) {
+            let range = "left out where zones.tolerance is given: the oracle puts the edge";
+            return Err(at("zones").refuse("edge_scaled", edge, range));
+        }
+        if zones.tolerance.is_some() {
+            return Ok(());
         }
         let edge = self.edge() / h;
         if !(least..=most * (1.0 + 1e-12)).contains(&edge) {

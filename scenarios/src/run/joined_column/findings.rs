@@ -34,9 +34,12 @@ impl JoinedColumn<'_> {
     pub(super) fn zones_in_words(&self) -> Vec<(String, String)> {
         let scene = self.scene;
         let d = scene.grains.diameter;
-        let why = match scene.zones.edge_scaled {
-            Some(_) => "given",
-            None => "computed: what lies 0.8 heights behind the end of the foot hardly flows",
+        let why = match (&self.oracle, scene.zones.edge_scaled) {
+            (Some((why, _)), _) => why.as_str(),
+            (None, Some(_)) => "given",
+            (None, None) => {
+                "computed: what lies 0.8 heights behind the end of the foot hardly flows"
+            }
         };
         let mut lines = vec![(
             "zones".to_owned(),
