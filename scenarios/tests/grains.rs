@@ -283,16 +283,14 @@ fn what_is_wrong_with_a_section_is_said_with_its_key() {
             "prepare=[{do=\"stir\"}]",
             &["prepare[0].do", "stir", "pour"],
         ),
-        ("prepare=[]; bodies={}", &["prepare", "packing"]),
         ("contact.normal=hook", &["contact.normal", "hooke"]),
         ("duration=1e9", &["steps", "1e10"]),
         ("wals.cup.radius=1", &["wals", "walls"]),
     ] {
-        let mut list = vec!["run", "grains", "--out", "bad"];
-        for part in set.split("; ") {
-            list.extend(["--set", part]);
-        }
-        let done = colluvium(folder.path(), &list);
+        let done = colluvium(
+            folder.path(),
+            &["run", "grains", "--out", "bad", "--set", set],
+        );
         let message = String::from_utf8_lossy(&done.stderr).into_owned();
         assert_eq!(done.status.code(), Some(2), "{set}: {message}");
         for word in words {
@@ -300,4 +298,30 @@ fn what_is_wrong_with_a_section_is_said_with_its_key() {
         }
         assert!(!folder.path().join("bad").exists(), "{set}");
     }
+}
+
+/// Bodies may stand alone; without them and without grains there is nothing to run.
+#[test]
+fn a_scene_of_nothing_is_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let bundled = succeed(folder.path(), &["scenes", "show", "grains"]);
+    let mut in_bodies = false;
+    let without: Vec<&str> = bundled
+        .lines()
+        .filter(|line| {
+            if line.starts_with('[') {
+                in_bodies = line.starts_with("[bodies") || line.starts_with("[[bodies");
+            }
+            !in_bodies
+        })
+        .collect();
+    std::fs::write(folder.path().join("own.toml"), without.join("\n")).unwrap();
+    let list = ["run", "own.toml", "--out", "bad", "--set", "prepare=[]"];
+    let refused = colluvium(folder.path(), &list);
+    let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+    assert_eq!(refused.status.code(), Some(2), "{message}");
+    for word in ["own.toml", "prepare", "packing"] {
+        assert!(message.contains(word), "no `{word}` in: {message}");
+    }
+    assert!(!folder.path().join("bad").exists());
 }
