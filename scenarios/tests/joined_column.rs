@@ -120,7 +120,11 @@ fn bad_joined_columns_are_refused_by_key() {
             "the oracle puts the edge",
         ),
         (&["zones.budget=1000"], "zones.budget", "zones.tolerance"),
-        (&["zones.tolerance=1e-9"], "zones.tolerance", "at least"),
+        (
+            &["aspect=1", "grains.diameter=0.03", "zones.tolerance=1e-9"],
+            "zones.tolerance",
+            "at least 0.1",
+        ),
         (&["overhang_degrees=10"], "overhang_degrees", "upright"),
         (
             &["overlap.shell_diameters=5"],
@@ -185,23 +189,24 @@ fn predicted(said: &str) -> f64 {
 fn the_oracle_puts_the_edge() {
     let folder = tempfile::tempdir().unwrap();
     let said = |sets: &[&str]| {
-        let mut plan = arguments("x", sets);
+        let column = ["aspect=0.5", "grains.diameter=0.03"];
+        let mut plan = arguments("x", &[&column, sets].concat());
         plan[0] = "plan";
         plan.drain(2..4);
         succeed(folder.path(), &plan)
     };
     let (strict, lax) = (
-        said(&["zones.tolerance=0.1"]),
-        said(&["zones.tolerance=0.4"]),
+        said(&["zones.tolerance=0.05"]),
+        said(&["zones.tolerance=0.3"]),
     );
     println!("{strict}\n{lax}");
     for concern in ["by the oracle", "window", "thickness", "wall"] {
         assert!(strict.contains(concern), "{strict}");
     }
     assert!(predicted(&lax) < predicted(&strict), "{lax}");
-    let poor = said(&["zones.tolerance=0.1", "zones.budget=700"]);
+    let poor = said(&["zones.tolerance=0.05", "zones.budget=4000"]);
     println!("{poor}");
-    assert!(poor.contains("raised from 0.1"), "{poor}");
+    assert!(poor.contains("raised from 0.05"), "{poor}");
     assert!(predicted(&poor) < predicted(&strict), "{poor}");
     assert!(!folder.path().join("x").exists());
 }
