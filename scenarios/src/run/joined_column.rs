@@ -22,6 +22,7 @@ use colluvium_continuum::column_collapse::CollapseCase;
 use colluvium_continuum::rheology::MuI;
 use colluvium_coupling::overlap::OverlapError;
 use colluvium_coupling::overlap::material_edge::{MaterialEdge, MaterialEdgeSpec};
+use colluvium_coupling::zones::Oracle;
 use colluvium_dem::preparation::{Packing, solid_fraction};
 use colluvium_dem::{Simulation, Snapshot};
 use std::path::Path;
@@ -148,13 +149,16 @@ impl<'a> JoinedColumn<'a> {
         })
     }
 
-    /// Where the law was measured, and the covariance of its numbers, as far as they are known.
-    fn validity(&self) -> Result<(Option<[f64; 2]>, Option<[[f64; 3]; 3]>), Failure> {
-        let Some(word) = self.scene.grains.calibrated.word() else {
-            return Ok((None, None));
-        };
-        let file = RheologyFile::read(Path::new(word))?;
-        Ok((file.valid_i, file.covariance))
+    /// Judges a continuum of this law by what its calibration tells of itself.
+    fn judge(&self, law: MuI) -> Result<Oracle, Failure> {
+        let word = self.scene.grains.calibrated.word();
+        let file = word.map(|word| RheologyFile::read(Path::new(word)));
+        let file = file.transpose()?;
+        Ok(Oracle {
+            law,
+            window: file.as_ref().and_then(|file| file.valid_i),
+            covariance: file.and_then(|file| file.covariance),
+        })
     }
 
     /// What the column is joined from, at a solid fraction.

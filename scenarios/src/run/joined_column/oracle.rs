@@ -39,12 +39,7 @@ pub(super) fn survey(scene: &CollapseScene, origin: &str) -> Result<Option<Surve
         cells: (spec.case.cells / COARSER).max(FEWEST),
         ..spec.case
     };
-    let (window, covariance) = column.validity()?;
-    let oracle = Oracle {
-        law: case.rheology,
-        window,
-        covariance,
-    };
+    let oracle = column.judge(case.rheology)?;
     let markers = follow(&case, scene, &oracle)?;
     let survey = Survey::of(&markers);
     let [least, most] = scene.edge_range(spec.settings.inner + spec.settings.buffer);
