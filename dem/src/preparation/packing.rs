@@ -324,7 +324,9 @@ impl Packing {
         let carried = given.flat_map(|clump| &clump.grains);
         carried.for_each(|&grain| alone[grain as usize] = false);
         let grains = self.grains.iter().zip(alone);
-        let grains = grains.filter_map(|(g, alone)| alone.then(|| (g.mass(), g.position)));
+        let grains = grains
+            .filter(|(_, alone)| *alone)
+            .map(|(g, _)| (g.mass(), g.position));
         let clumps = self.clumps.iter().filter_map(|clump| clump.mass);
         grains.chain(clumps.map(|m| (m.mass, m.centre)))
     }

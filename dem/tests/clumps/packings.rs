@@ -134,13 +134,13 @@ fn clumps_are_poured_kept_and_made_again_as_they_were() {
     };
     let mut cut = packing.clone();
     let gone = cut.trim(&half).unwrap();
-    assert!(gone > 0 && gone % 4 == 0);
+    assert!(gone > 0 && gone.is_multiple_of(4));
     assert_eq!(cut.clumps.len(), 60 - gone / 4);
     assert!(cut.grains.iter().all(|g| g.position.x < 0.0));
     assert_eq!(again(&cut).clump_count(), cut.clumps.len());
     let mut glued = packing.clone();
     let fixed = glued.glue(&half).unwrap();
-    assert!(fixed % 4 == 0 && glued.clumps.len() == 60 - fixed / 4);
+    assert!(fixed.is_multiple_of(4) && glued.clumps.len() == 60 - fixed / 4);
     let reaching = glued
         .grains
         .iter()
