@@ -6,7 +6,7 @@ use crate::results_file::{read_attribute, reason};
 use hdf5::Dataset;
 use std::path::Path;
 
-/// Reads a file of one frame that [`write()`] has written.
+/// Reads a file of one frame that [`super::write()`] has written.
 pub fn read_frame(path: &Path) -> Result<Frame, Failure> {
     read_one(path).map_err(|error| {
         let (path, reason) = (path.display(), reason(&error));
@@ -14,7 +14,7 @@ pub fn read_frame(path: &Path) -> Result<Frame, Failure> {
     })
 }
 
-/// Reads all frames of a file that [`write()`] has written.
+/// Reads all frames of a file that [`super::write()`] has written.
 pub fn read_series(path: &Path) -> Result<Vec<Frame>, Failure> {
     read(path).map_err(|error| {
         let (path, reason) = (path.display(), reason(&error));
