@@ -28,6 +28,7 @@ pub mod precheck;
 pub mod settle;
 mod silo;
 pub mod step;
+mod surface_fields;
 mod surface_steps;
 mod tensile;
 mod tumbling_box;

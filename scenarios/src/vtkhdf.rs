@@ -1,14 +1,18 @@
 //! VTKHDF: grains, contacts and fields through time in files that ParaView opens as they are.
 //!
-//! Layout: group `/VTKHDF` of type `PolyData`, version 2.0, one part a time step; points and cells of all
-//! steps one behind the other, and in `Steps` where each step begins.
+//! Layout: group `/VTKHDF` of type `PolyData`, or `UnstructuredGrid` for cells in space, version 2.0, one part
+//! a time step; points and cells of all steps one behind the other, and in `Steps` where each step begins.
+//! Cells in space share the points that they have in common, so that fields can be carried from cells to
+//! points.
 //! Source: VTK file format documentation, "VTKHDF File Format" (Kitware).
 
 use crate::failure::Failure;
-use crate::results_file::{attribute, put_in_place, read_attribute, reason};
-use hdf5::types::FixedAscii;
-use hdf5::{Dataset, Extent, Group, H5Type};
+use crate::results_file::{put_in_place, read_attribute, reason};
+use hdf5::{Dataset, Group};
 use std::path::Path;
+
+mod series;
+use series::Series;
 
 /// What the cells of a frame are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -19,6 +23,9 @@ pub enum Cells {
     Lines,
     /// Points 4 k to 4 k + 3 go round quadrilateral k.
     Quadrilaterals,
+    /// Points 8 k to 8 k + 3 go round the base of hexahedron k, 8 k + 4 to 8 k + 7 round its top, in the same
+    /// order.
+    Hexahedra,
 }
 
 /// Values of a field.
@@ -56,25 +63,14 @@ pub struct Frame {
     pub fields: Vec<Field>,
 }
 
-/// Kinds of cells in the order of the format.
-const TOPOLOGIES: [&str; 4] = ["Vertices", "Lines", "Polygons", "Strips"];
-/// Values of a chunk of a dataset.
-const CHUNK: usize = 4096;
-
 impl Cells {
-    fn topology(self) -> usize {
-        match self {
-            Cells::Points => 0,
-            Cells::Lines => 1,
-            Cells::Quadrilaterals => 2,
-        }
-    }
-
-    fn points_each(self) -> usize {
+    /// Points of a cell.
+    pub fn points_each(self) -> usize {
         match self {
             Cells::Points => 1,
             Cells::Lines => 2,
             Cells::Quadrilaterals => 4,
+            Cells::Hexahedra => 8,
         }
     }
 
@@ -82,7 +78,7 @@ impl Cells {
     fn data(self) -> &'static str {
         match self {
             Cells::Points => "PointData",
-            Cells::Lines | Cells::Quadrilaterals => "CellData",
+            Cells::Lines | Cells::Quadrilaterals | Cells::Hexahedra => "CellData",
         }
     }
 }
@@ -183,15 +179,7 @@ fn read_one(path: &Path) -> hdf5::Result<Frame> {
 
 fn read(path: &Path) -> hdf5::Result<Vec<Frame>> {
     let root = hdf5::File::open(path)?.group("VTKHDF")?;
-    // There may be no cells at this instant; the fields are over something nevertheless.
-    let corners: Vec<i64> = root.dataset("Polygons/Connectivity")?.read_raw()?;
-    let cells = if !corners.is_empty() {
-        Cells::Quadrilaterals
-    } else if root.link_exists(Cells::Lines.data()) {
-        Cells::Lines
-    } else {
-        Cells::Points
-    };
+    let cells = kind_of(&root)?;
     let times: Vec<f64> = root.dataset("Steps/Values")?.read_raw()?;
     let sizes: Vec<i64> = root.dataset("NumberOfPoints")?.read_raw()?;
     if sizes.len() != times.len() {
@@ -199,10 +187,18 @@ fn read(path: &Path) -> hdf5::Result<Vec<Frame>> {
     }
     let all = vectors(&root.dataset("Points")?)?;
     let mut frames = Vec::with_capacity(times.len());
+    let mut corners = match cells {
+        Cells::Hexahedra => Corners::of(&root)?,
+        _ => Corners::default(),
+    };
     let mut begin = 0;
     for (&time, &size) in times.iter().zip(&sizes) {
         let end = begin + usize::try_from(size).map_err(|e| e.to_string())?;
-        let points = all.get(begin..end).ok_or("points are missing")?.to_vec();
+        let own = all.get(begin..end).ok_or("points are missing")?;
+        let points = match cells {
+            Cells::Hexahedra => corners.next_of(own)?,
+            _ => own.to_vec(),
+        };
         frames.push(Frame {
             time,
             cells,
@@ -237,6 +233,56 @@ fn read(path: &Path) -> hdf5::Result<Vec<Frame>> {
     Ok(frames)
 }
 
+/// Kind of the cells of a file. There may be none at this instant; the fields are over something nevertheless.
+fn kind_of(root: &Group) -> hdf5::Result<Cells> {
+    if root.link_exists("Connectivity") {
+        return Ok(Cells::Hexahedra);
+    }
+    let corners: Vec<i64> = root.dataset("Polygons/Connectivity")?.read_raw()?;
+    Ok(if !corners.is_empty() {
+        Cells::Quadrilaterals
+    } else if root.link_exists(Cells::Lines.data()) {
+        Cells::Lines
+    } else {
+        Cells::Points
+    })
+}
+
+/// Numbers of the shared points at the corners of cells, step by step.
+#[derive(Default)]
+struct Corners {
+    all: Vec<i64>,
+    counts: std::vec::IntoIter<i64>,
+    read: usize,
+}
+
+impl Corners {
+    fn of(root: &Group) -> hdf5::Result<Corners> {
+        let counts: Vec<i64> = root.dataset("NumberOfConnectivityIds")?.read_raw()?;
+        Ok(Corners {
+            all: root.dataset("Connectivity")?.read_raw()?,
+            counts: counts.into_iter(),
+            read: 0,
+        })
+    }
+
+    /// The points of the next step, cell by cell.
+    fn next_of(&mut self, points: &[[f64; 3]]) -> hdf5::Result<Vec<[f64; 3]>> {
+        let count = self.counts.next().and_then(|n| usize::try_from(n).ok());
+        let end = self.read + count.ok_or("corners are missing")?;
+        let ids = self.all.get(self.read..end).ok_or("corners are missing")?;
+        self.read = end;
+        let at = |id: &i64| usize::try_from(*id).ok().and_then(|id| points.get(id));
+        ids.iter()
+            .map(|id| {
+                at(id)
+                    .copied()
+                    .ok_or_else(|| "a corner has no point".into())
+            })
+            .collect()
+    }
+}
+
 impl Values {
     /// Some of them.
     fn part(&self, range: std::ops::Range<usize>) -> Option<Values> {
@@ -250,167 +296,6 @@ impl Values {
 
 fn vectors(dataset: &Dataset) -> hdf5::Result<Vec<[f64; 3]>> {
     Ok(dataset.read_raw::<f64>()?.as_chunks::<3>().0.to_vec())
-}
-
-/// A file in the making.
-struct Series {
-    root: Group,
-    cells: Cells,
-    frames: usize,
-}
-
-impl Series {
-    /// Lays the groups of a file whose frames all are like this one.
-    fn begin(root: &Group, like: &Frame) -> hdf5::Result<Series> {
-        root.new_attr::<i64>()
-            .shape(2)
-            .create("Version")?
-            .write_raw(&[2_i64, 0])?;
-        let kind = FixedAscii::<8>::from_ascii("PolyData")
-            .map_err(|error| hdf5::Error::from(error.to_string()))?;
-        root.new_attr::<FixedAscii<8>>()
-            .create("Type")?
-            .write_scalar(&kind)?;
-        let counts = |at: &Group, name: &str| list::<i64>(at, name);
-        counts(root, "NumberOfPoints")?;
-        table::<f64>(root, "Points", 3)?;
-        for topology in TOPOLOGIES {
-            let group = root.create_group(topology)?;
-            for name in [
-                "NumberOfCells",
-                "NumberOfConnectivityIds",
-                "Offsets",
-                "Connectivity",
-            ] {
-                counts(&group, name)?;
-            }
-        }
-        let steps = root.create_group("Steps")?;
-        list::<f64>(&steps, "Values")?;
-        for name in ["PartOffsets", "NumberOfParts", "PointOffsets"] {
-            counts(&steps, name)?;
-        }
-        for name in ["CellOffsets", "ConnectivityIdOffsets"] {
-            table::<i64>(&steps, name, TOPOLOGIES.len())?;
-        }
-        let data = root.create_group(like.cells.data())?;
-        let offsets = steps.create_group(&format!("{}Offsets", like.cells.data()))?;
-        for field in &like.fields {
-            let dataset = match field.values {
-                Values::Scalars(_) => list::<f64>(&data, &field.name)?,
-                Values::Vectors(_) => table::<f64>(&data, &field.name, 3)?,
-                Values::Counts(_) => counts(&data, &field.name)?,
-            };
-            attribute(&dataset, "unit", &field.unit)?;
-            counts(&offsets, &field.name)?;
-        }
-        Ok(Series {
-            root: root.clone(),
-            cells: like.cells,
-            frames: 0,
-        })
-    }
-
-    fn append(&mut self, frame: &Frame) -> hdf5::Result<()> {
-        if frame.cells != self.cells {
-            return Err("frames of different cells in one file".into());
-        }
-        let (root, data) = (&self.root, self.cells.data());
-        let steps = root.group("Steps")?;
-        let points = root.dataset("Points")?;
-        let points_before = points.shape()[0] as i64;
-        push(&steps.dataset("Values")?, &[frame.time])?;
-        push(&steps.dataset("PartOffsets")?, &[self.frames as i64])?;
-        push(&steps.dataset("NumberOfParts")?, &[1_i64])?;
-        push(&steps.dataset("PointOffsets")?, &[points_before])?;
-        push(
-            &root.dataset("NumberOfPoints")?,
-            &[frame.points.len() as i64],
-        )?;
-        push_rows(&points, &frame.points)?;
-        let (mut cells_before, mut ids_before) = ([0_i64; 4], [0_i64; 4]);
-        for (k, topology) in TOPOLOGIES.into_iter().enumerate() {
-            let group = root.group(topology)?;
-            let connectivity = group.dataset("Connectivity")?;
-            let offsets = group.dataset("Offsets")?;
-            // One more offset than cells in every frame.
-            cells_before[k] = offsets.shape()[0] as i64 - self.frames as i64;
-            ids_before[k] = connectivity.shape()[0] as i64;
-            let own = k == self.cells.topology();
-            let cells = if own { frame.cell_count() } else { 0 };
-            let each = self.cells.points_each();
-            let ids: Vec<i64> = (0..(cells * each) as i64).collect();
-            let ends: Vec<i64> = (0..=cells).map(|cell| (cell * each) as i64).collect();
-            push(&group.dataset("NumberOfCells")?, &[cells as i64])?;
-            push(
-                &group.dataset("NumberOfConnectivityIds")?,
-                &[ids.len() as i64],
-            )?;
-            push(&offsets, &ends)?;
-            push(&connectivity, &ids)?;
-        }
-        push_rows(&steps.dataset("CellOffsets")?, &[cells_before])?;
-        push_rows(&steps.dataset("ConnectivityIdOffsets")?, &[ids_before])?;
-        let offsets = steps.group(&format!("{data}Offsets"))?;
-        let data = root.group(data)?;
-        for field in &frame.fields {
-            let dataset = data.dataset(&field.name)?;
-            push(&offsets.dataset(&field.name)?, &[dataset.shape()[0] as i64])?;
-            match &field.values {
-                Values::Scalars(values) => push(&dataset, values)?,
-                Values::Vectors(values) => push_rows(&dataset, values)?,
-                Values::Counts(values) => push(&dataset, values)?,
-            }
-        }
-        self.frames += 1;
-        Ok(())
-    }
-
-    fn finish(&self) -> hdf5::Result<()> {
-        self.root
-            .group("Steps")?
-            .new_attr::<i64>()
-            .create("NSteps")?
-            .write_scalar(&(self.frames as i64))
-    }
-}
-
-/// An empty list that can grow.
-fn list<T: H5Type>(at: &Group, name: &str) -> hdf5::Result<Dataset> {
-    at.new_dataset::<T>()
-        .chunk(CHUNK)
-        .shuffle()
-        .deflate(1)
-        .shape(Extent::resizable(0))
-        .create(name)
-}
-
-/// An empty table that can grow.
-fn table<T: H5Type>(at: &Group, name: &str, columns: usize) -> hdf5::Result<Dataset> {
-    at.new_dataset::<T>()
-        .chunk((CHUNK, columns))
-        .shuffle()
-        .deflate(1)
-        .shape((Extent::resizable(0), Extent::fixed(columns)))
-        .create(name)
-}
-
-fn push<T: H5Type>(to: &Dataset, values: &[T]) -> hdf5::Result<()> {
-    let from = to.shape()[0];
-    to.resize(from + values.len())?;
-    if values.is_empty() {
-        return Ok(());
-    }
-    to.write_slice::<_, T, _, _>(values, from..from + values.len())
-}
-
-fn push_rows<T: H5Type, const N: usize>(to: &Dataset, rows: &[[T; N]]) -> hdf5::Result<()> {
-    let from = to.shape()[0];
-    to.resize((from + rows.len(), N))?;
-    if rows.is_empty() {
-        return Ok(());
-    }
-    to.write_slice::<_, T, _, _>(rows, (from..from + rows.len(), 0..N))
 }
 
 #[cfg(test)]
@@ -447,7 +332,13 @@ mod tests {
     #[test]
     fn a_frame_reads_back() {
         let folder = tempfile::tempdir().unwrap();
-        for (cells, points) in [(Cells::Points, 8), (Cells::Lines, 8), (Cells::Lines, 0)] {
+        for (cells, points) in [
+            (Cells::Points, 8),
+            (Cells::Lines, 8),
+            (Cells::Lines, 0),
+            (Cells::Hexahedra, 16),
+            (Cells::Hexahedra, 0),
+        ] {
             let path = folder.path().join("frame.vtkhdf");
             write(&path, [Ok(frame(0.5, points, cells))]).unwrap();
             assert_eq!(read_frame(&path).unwrap(), frame(0.5, points, cells));
