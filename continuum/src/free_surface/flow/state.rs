@@ -148,7 +148,7 @@ pub struct Spent {
     pub newton: f64,
 }
 
-/// Fields of a cell of a [`SpaceFlow`].
+/// Fields of a cell of a [`super::SpaceFlow`].
 pub type SpaceFields = CellFields<3, SPACE_COMPONENTS>;
-/// The state of a [`SpaceFlow`].
+/// The state of a [`super::SpaceFlow`].
 pub type SpaceState = SurfaceState<3, SPACE_COMPONENTS>;
