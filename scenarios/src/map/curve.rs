@@ -152,7 +152,8 @@ mod tests {
             let off = found.curve.friction[k] - truth(*i);
             assert!(off.abs() < 2.0 * error && error < 0.01, "{off} {error}");
         }
-        assert_eq!(found.valid_i, [0.1, 0.5 * 1.14]);
+        let [low, high] = found.valid_i;
+        assert!((low - 0.1).abs() < 1e-12 && (high - 0.57).abs() < 1e-12);
         let zz = measured(None, &points, Stress::NormalPressure).unwrap();
         let ratio = zz.curve.friction[1] / found.curve.friction[1];
         assert!((ratio - 0.9).abs() < 1e-9, "{ratio}");
