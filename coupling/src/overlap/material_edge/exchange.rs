@@ -2,7 +2,7 @@
 
 use super::cells::over;
 use super::rows::{Load, Row, bearers, displacements, slopes};
-use super::{MaterialEdge, OverlapError, label_of};
+use super::{MaterialEdge, OverlapError};
 use colluvium_dem::{GrainSample, Simulation};
 
 /// Cells with less of the mass of a full one are not spoken for by their grains.
@@ -39,12 +39,15 @@ impl MaterialEdge {
             self.exchange(simulation)?;
             self.made = 0;
             self.exchanges += 1;
+            self.travel(simulation)?;
         }
         self.lay(simulation)
     }
 
     /// Books the impulses of what was laid over the steps made since.
     fn book_grains(&mut self, simulation: &Simulation) {
+        self.monitors.grain_steps +=
+            simulation.grain_count() as f64 * self.steps_of_loads as f64;
         let time = self.kick + (self.steps_of_loads - 1) as f64 * self.timestep;
         for (sum, force) in self.given.relaxation.iter_mut().zip(&self.laid.relaxation) {
             for (sum, force) in sum.iter_mut().zip(force) {
@@ -76,7 +79,7 @@ impl MaterialEdge {
         scratch.near.extend(
             simulation
                 .held(|x| x.x < reach)
-                .filter_map(|g| label_of(&self.labels, &g).map(|label| (g, label)))
+                .filter_map(|g| self.labels.of(&g).map(|label| (g, label)))
                 .filter(|(_, label)| *label < buffer),
         );
         // Rows may stand in another order after a restart, and sums over them end in other bits.
@@ -179,11 +182,15 @@ impl MaterialEdge {
 
     /// Sums of the grains over the cells, stresses taken into their averages with this weight.
     pub(super) fn sum_up(&mut self, weight: f64) {
-        let snapshot = &self.sighting.snapshot;
+        self.see_grains();
+        self.sums.press(&self.cells, &self.sighting.snapshot, weight);
+    }
+
+    /// Masses, labels and velocities of the grains over the cells.
+    pub(super) fn see_grains(&mut self) {
         let (labels, inner) = (&self.labels, self.spec.zones()[1]);
         self.sums
-            .cover(&self.cells, snapshot, inner, |g| label_of(labels, g));
-        self.sums.press(&self.cells, snapshot, weight);
+            .cover(&self.cells, &self.sighting.snapshot, inner, |g| labels.of(g));
     }
 
     /// Mass of a cell full of continuum (kg).
@@ -273,7 +280,7 @@ impl MaterialEdge {
             (cover.inner, cover.inner_slip) = (0.0, [0.0; 2]);
         }
         for grain in &self.sighting.snapshot.grains {
-            let Some(label) = label_of(&self.labels, grain).filter(|label| *label < inner) else {
+            let Some(label) = self.labels.of(grain).filter(|label| *label < inner) else {
                 continue;
             };
             let hats = self.cells.hats(grain.position.x, grain.position.z);
@@ -322,7 +329,7 @@ impl MaterialEdge {
         let near = snapshot
             .grains
             .iter()
-            .filter(|g| label_of(&self.labels, g).is_some_and(|label| label < buffer));
+            .filter(|g| self.labels.of(g).is_some_and(|label| label < buffer));
         self.held.reach = near.fold(0.0, |most: f64, g| most.max(g.position.x)) + d;
         let places = self.surface_of(0.5 * self.spec.settings.shell);
         let slopes = slopes(&places, &self.cells);
@@ -349,13 +356,14 @@ impl MaterialEdge {
     /// the grains of nearby labels.
     pub(super) fn surface_of(&self, label: f64) -> Vec<f64> {
         let band = BAND * self.spec.case.rheology.diameter;
+        let place = self.spec.place + self.labels.edge;
         let mut sums = vec![[0.0; 2]; self.cells.counts[1]];
         for grain in &self.sighting.snapshot.grains {
-            let Some(own) = label_of(&self.labels, grain) else {
+            let Some(own) = self.labels.of(grain) else {
                 continue;
             };
             if (own - label).abs() < band {
-                let moved = grain.position.x - self.spec.place - own;
+                let moved = grain.position.x - place - own;
                 for (row, hat) in self.cells.rows(grain.position.z) {
                     sums[row][0] += grain.mass * hat;
                     sums[row][1] += grain.mass * hat * moved;
@@ -363,7 +371,7 @@ impl MaterialEdge {
             }
         }
         let least = LEAST_ROW * self.spec.density() * band * self.cells.spacing * self.spec.slab;
-        let start = self.spec.place + label;
+        let start = place + label;
         displacements(&sums, least)
             .into_iter()
             .map(|moved| start + moved)

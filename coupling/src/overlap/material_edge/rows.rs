@@ -129,6 +129,7 @@ mod tests {
     fn an_edge_that_leans_has_the_slope_of_its_displacements() {
         let cells = Cells {
             counts: [4, 6],
+            low: 0.0,
             spacing: 0.5,
             slab: 1.0,
         };
