@@ -28,6 +28,7 @@ fn grain(id: u32, position: Vector3<f64>, radius: f64, fixed: bool) -> GrainSamp
         radius,
         mass: 2600.0 * 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3),
         fixed,
+        clump: None,
     }
 }
 

@@ -37,6 +37,7 @@ fn commotion(seed: u64) -> Snapshot {
             radius: rng.random_range(0.2..0.4),
             mass: rng.random_range(0.5..2.0),
             fixed: id % 8 == 0,
+            clump: None,
         })
         .collect();
     let mut contacts = Vec::new();
@@ -399,6 +400,7 @@ fn a_cradle_carries_its_weight_and_its_pulse() {
             radius: 0.5,
             mass: 1.0,
             fixed: false,
+            clump: None,
         })
         .collect();
     let contact = |grain: usize, partner, push: f64, arm: f64| ContactSample {
@@ -487,6 +489,7 @@ fn a_cubic_packing_has_its_exact_fields() {
                     radius: 0.5,
                     mass: 2.0,
                     fixed: false,
+                    clump: None,
                 });
                 for (axis, other) in [at(i + 1, j, k), at(i, j + 1, k), at(i, j, k + 1)]
                     .into_iter()
@@ -572,6 +575,7 @@ fn around_an_axis_a_rigid_rotation_is_azimuthal() {
                 radius: 0.1,
                 mass: 1.0,
                 fixed: false,
+                clump: None,
             }
         })
         .collect();

@@ -24,6 +24,7 @@ impl Simulation {
                 radius: place[3],
                 mass: grains.mass[i],
                 fixed: grains.is_fixed(i),
+                clump: self.clumps.number(i),
             })
         })
     }

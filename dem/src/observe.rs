@@ -59,6 +59,7 @@ impl Simulation {
             radius: self.grains.place[i][3],
             mass: self.grains.mass[i],
             fixed: self.grains.is_fixed(i),
+            clump: self.clumps.number(i),
         }
     }
 

@@ -22,6 +22,8 @@ pub struct GrainSample {
     pub mass: f64,
     /// Held in place: part of a wall or a rough base.
     pub fixed: bool,
+    /// Number of the clump that carries it (see [`crate::ClumpSample::number`]).
+    pub clump: Option<u32>,
 }
 
 /// Who a grain touches.

@@ -362,7 +362,7 @@ fn gravity_falls_in_stages_without_moving_the_bed() {
     let setup = gravel_cloud();
     let mut stages = Stages::at(&[9.81, 1e-2, 2.5e-4]);
     stages.largest_overlap = 0.05;
-    let (mut simulation, reports) = settle_in_stages(setup.clone(), &stages, &mut go).unwrap();
+    let (mut simulation, reports) = settle_in_stages(setup.clone(), &[], &stages, &mut go).unwrap();
     for report in &reports {
         println!("{report}");
         assert!(stages.rest.holds(&report.rest), "{report}");
@@ -388,7 +388,7 @@ fn gravity_falls_in_stages_without_moving_the_bed() {
     // The same bed released at once from springs made for 1 g bursts.
     let mut first = Stages::at(&[9.81]);
     first.largest_overlap = 0.05;
-    let (mut simulation, reports) = settle_in_stages(setup, &first, &mut go).unwrap();
+    let (mut simulation, reports) = settle_in_stages(setup, &[], &first, &mut go).unwrap();
     let height = |s: &mut Simulation| {
         let grains = s.grain_list();
         grains.iter().map(|g| g.position.z).sum::<f64>() / grains.len() as f64
@@ -585,6 +585,7 @@ fn packings_are_trimmed_glued_scaled_and_placed() {
         domain: cube(3.0, [false; 3]),
         grains: lattice.collect(),
         contacts: vec![[0, 1], [1, 2], [0, 9]],
+        clumps: Vec::new(),
     };
     let base = block([0.0; 3], [3.0, 3.0, 1.0]);
     assert_eq!(packing.glue(&base).unwrap(), 9);

@@ -145,8 +145,8 @@ enum Command {
         /// The axis that is looked along
         #[arg(long, value_name = "AXIS", value_parser = ["x", "y", "z"], default_value = "y")]
         view: String,
-        /// Colour by speed, or by what hangs together
-        #[arg(long, value_name = "WHAT", value_parser = ["speed", "cluster"], default_value = "speed")]
+        /// Colour by speed, by what hangs together, or by clump
+        #[arg(long, value_name = "WHAT", value_parser = ["speed", "cluster", "clump"], default_value = "speed")]
         colour: String,
         /// Pictures a second
         #[arg(long, value_name = "N", default_value_t = 10, value_parser = clap::value_parser!(u16).range(1..=50))]
@@ -476,6 +476,7 @@ pub fn execute(line: CommandLine) -> Result<(), Failure> {
                 },
                 colour: match colour.as_str() {
                     "cluster" => render::Colour::Cluster,
+                    "clump" => render::Colour::Clump,
                     _ => render::Colour::Speed,
                 },
                 per_second,

@@ -1,4 +1,4 @@
-//! Pictures of a run through time: `grains.vtkhdf`, `contacts.vtkhdf`, `fields.vtkhdf`.
+//! Pictures of a run through time: `grains.vtkhdf`, `contacts.vtkhdf`, `bodies.vtkhdf`, `clumps.vtkhdf`, `fields.vtkhdf`.
 //!
 //! While a run goes on, every instant lies in a file of its own in the folder `frames`, put in place
 //! whole: a killed run or a full disk leaves all earlier ones, and a run that is resumed writes the same
@@ -11,10 +11,14 @@ use nalgebra::Vector3;
 use std::fs;
 use std::path::{Path, PathBuf};
 
+pub mod rigid;
+
 /// Folder of single frames in a run directory.
 pub const FOLDER: &str = "frames";
 /// Series at the end of a run with grains.
 pub const SERIES: [&str; 2] = ["grains", "contacts"];
+/// Series at the end of a run with bodies, and of one with clumps.
+pub const RIGID: [&str; 2] = ["bodies", "clumps"];
 /// Series at the end of a run of a continuum.
 pub const FIELDS: &str = "fields";
 
@@ -26,6 +30,8 @@ pub struct Frames {
     steps: u64,
     /// How many frames it has besides that of the start; none writes no files.
     count: u64,
+    /// Which of the series [`RIGID`] it has.
+    rigid: [bool; 2],
 }
 
 impl Frames {
@@ -35,7 +41,21 @@ impl Frames {
             directory: directory.to_owned(),
             steps,
             count: count.min(steps),
+            rigid: [false; 2],
         }
+    }
+
+    /// Takes bodies along, and clumps.
+    pub fn with_rigid(mut self, bodies: bool, clumps: bool) -> Frames {
+        self.rigid = [bodies, clumps];
+        self
+    }
+
+    /// The series that it has.
+    fn series(&self) -> impl Iterator<Item = &'static str> {
+        let rigid = RIGID.into_iter().zip(self.rigid);
+        let rigid = rigid.filter_map(|(series, given)| given.then_some(series));
+        SERIES.into_iter().chain(rigid)
     }
 
     fn step_of(&self, frame: u64) -> u64 {
@@ -70,6 +90,14 @@ impl Frames {
         for (series, frame) in SERIES.into_iter().zip(frames) {
             put(&self.directory, series, step, frame)?;
         }
+        let [bodies, clumps] = self.rigid;
+        if bodies {
+            let frame = rigid::bodies(simulation, snapshot);
+            put(&self.directory, RIGID[0], step, frame)?;
+        }
+        if clumps {
+            put(&self.directory, RIGID[1], step, rigid::clumps(simulation))?;
+        }
         Ok(())
     }
 
@@ -82,7 +110,7 @@ impl Frames {
         let mut steps: Vec<u64> = (0..=self.count).map(|frame| self.step_of(frame)).collect();
         steps.dedup();
         steps.retain(|&step| step <= done);
-        for series in SERIES {
+        for series in self.series() {
             join(&self.directory, series, &steps)?;
         }
         Ok(())
@@ -121,7 +149,7 @@ pub fn remove(directory: &Path) -> std::io::Result<()> {
         return Ok(());
     }
     let own = |name: &str| {
-        let mut all = SERIES.iter().chain([&FIELDS]);
+        let mut all = SERIES.iter().chain(&RIGID).chain([&FIELDS]);
         let series = all.any(|series| name.starts_with(&format!("{series}_")));
         series && (name.ends_with(".vtkhdf") || name.ends_with(".partial"))
     };
@@ -179,6 +207,11 @@ pub fn grains(snapshot: &Snapshot, clusters: &Clusters) -> Frame {
             field("force", "N", vectors(order.iter().map(|&g| force[g]))),
             field("contacts", "1", counts(&|g| touching[g])),
             field("cluster", "1", counts(&first)),
+            field(
+                "clump",
+                "number of its first grain, -1 for a grain alone",
+                counts(&|g| snapshot.grains[g].clump.map_or(-1, i64::from)),
+            ),
             field(
                 "fixed",
                 "1",

@@ -49,6 +49,7 @@ struct Row {
     mass: Option<f64>,
     density: Option<f64>,
     fixed: bool,
+    clump: Option<u32>,
 }
 
 /// A contact as a file has it; the second grain is none at a wall.
@@ -134,6 +135,7 @@ fn snapshot(instant: &Instant, unsaid: &Unsaid) -> Result<Snapshot, String> {
             radius,
             mass,
             fixed: row.fixed || unsaid.fixed_types.contains(&row.kind),
+            clump: row.clump,
         });
     }
     let mut contacts = Vec::with_capacity(instant.links.len());

@@ -7,6 +7,7 @@
 //! crates take and give plain data.
 
 pub mod averages;
+pub mod body_facets;
 pub mod calibrate;
 pub mod checkpoint;
 pub mod coarse_grain;

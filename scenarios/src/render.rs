@@ -1,13 +1,13 @@
 //! Series of a run as pictures and as an animation (`colluvium render`).
 //!
-//! Grains are balls coloured by their speed or by what they hang together with; fields of a continuum are its cells
-//! coloured by speed. All pictures of a run have one frame and one scale of colours.
+//! Grains are balls coloured by their speed, by what they hang together with or by their clump; bodies are their
+//! surfaces; fields of a continuum are its cells coloured by speed. All pictures of a run have one frame and one scale of colours.
 
 use crate::failure::Failure;
-use crate::frames::{FIELDS, SERIES};
+use crate::frames::{FIELDS, RIGID, SERIES};
 use crate::report;
 use crate::run::world::pictures::canvas::{Ball, Extent, Plate, paint_over};
-use crate::run::world::pictures::{PALETTE, PLAIN, encode, fastest, speed_colour};
+use crate::run::world::pictures::{BODY, PLAIN, encode, fastest, palette, speed_colour};
 use crate::run_directory::{ANIMATION, SUMMARY, summary_text, write_in_place};
 use crate::summary::{Figure, Summary};
 use crate::vtkhdf::{self, Cells, Frame};
@@ -50,8 +50,10 @@ impl View {
 pub enum Colour {
     /// Speed.
     Speed,
-    /// What hangs together, by contacts or bonds.
+    /// What hangs together, by bonds or as clumps.
     Cluster,
+    /// Clumps.
+    Clump,
 }
 
 /// How a run is drawn.
@@ -129,8 +131,12 @@ fn draw(directory: &Path, request: &Request) -> Result<Figure, Failure> {
     }
     let mut extent = Extent::NOTHING;
     let mut instants = Vec::with_capacity(frames.len());
-    for frame in &frames {
-        let instant = instant(frame, request, top).map_err(refuse)?;
+    let bodies = bodies(directory, &path, frames.len())?;
+    for (k, frame) in frames.iter().enumerate() {
+        let mut instant = instant(frame, request, top).map_err(refuse)?;
+        if let Some(bodies) = bodies.get(k) {
+            instant.plates.extend(surfaces(bodies, request.view));
+        }
         extent.reach(&instant.balls, &instant.plates);
         instants.push(instant);
     }
@@ -149,6 +155,7 @@ fn draw(directory: &Path, request: &Request) -> Result<Figure, Failure> {
     let colours = match request.colour {
         Colour::Speed => format!("speed from 0 (violet) to {top:.3e} m/s (yellow)"),
         Colour::Cluster => "what hangs together".to_owned(),
+        Colour::Clump => "clumps, single grains grey".to_owned(),
     };
     let last = instants.last().map_or(0.0, |i| i.time);
     let count = instants.len();
@@ -237,6 +244,34 @@ fn series(directory: &Path) -> Result<(PathBuf, Vec<Frame>), Failure> {
     )))
 }
 
+/// The bodies of a run of grains with so many instants; none where there are none.
+fn bodies(directory: &Path, grains: &Path, instants: usize) -> Result<Vec<Frame>, Failure> {
+    let path = directory.join(format!("{}.vtkhdf", RIGID[0]));
+    if !path.exists() || grains.file_stem().is_none_or(|name| name != SERIES[0]) {
+        return Ok(Vec::new());
+    }
+    let frames = vtkhdf::read_series(&path).map_err(|error| Failure::Input(error.to_string()))?;
+    if frames.len() != instants {
+        let (own, count) = (path.display(), frames.len());
+        let why = format!(
+            "{own}: {count} instants, but {} has {instants}",
+            grains.display()
+        );
+        return Err(Failure::Input(why));
+    }
+    Ok(frames)
+}
+
+/// Triangles of bodies as they are painted.
+fn surfaces(bodies: &Frame, view: View) -> Vec<Plate> {
+    let corners: Vec<[f64; 3]> = bodies.points.iter().map(|&p| view.axes(p)).collect();
+    let plate = |&corners: &[[f64; 3]; 3]| Plate {
+        corners,
+        colour: BODY,
+    };
+    corners.as_chunks::<3>().0.iter().map(plate).collect()
+}
+
 /// Speeds of what may move (m/s).
 fn moving_speeds(frame: &Frame) -> Result<Vec<f64>, String> {
     let fixed: Cow<[i64]> = match frame.cells {
@@ -262,11 +297,15 @@ fn instant(frame: &Frame, request: &Request, top: f64) -> Result<Instant, String
     match frame.cells {
         Cells::Points => {
             let (radius, fixed) = (frame.scalars("radius")?, frame.counts("fixed")?);
-            let cluster = frame.counts("cluster")?;
-            let colour = |k: usize| match request.colour {
+            let group = match request.colour {
+                Colour::Speed => &[],
+                Colour::Cluster => frame.counts("cluster")?,
+                Colour::Clump => frame.counts("clump")?,
+            };
+            let colour = |k: usize| match group.get(k) {
                 _ if fixed[k] != 0 => PLAIN,
-                Colour::Speed => fast(&velocity[k]),
-                Colour::Cluster => PALETTE[cluster[k].unsigned_abs() as usize % PALETTE.len()],
+                None => fast(&velocity[k]),
+                Some(&number) => u32::try_from(number).map_or(PLAIN, palette),
             };
             balls.extend(places.enumerate().map(|(k, [right, up, depth])| Ball {
                 at: [right, up],
@@ -284,6 +323,7 @@ fn instant(frame: &Frame, request: &Request, top: f64) -> Result<Instant, String
             }
         }
         Cells::Lines => return Err("holds lines, not grains or cells".into()),
+        Cells::Triangles => return Err("holds bodies alone, not grains or cells".into()),
     }
     Ok(Instant {
         time: frame.time,

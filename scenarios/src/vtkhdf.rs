@@ -5,10 +5,14 @@
 //! Source: VTK file format documentation, "VTKHDF File Format" (Kitware).
 
 use crate::failure::Failure;
-use crate::results_file::{attribute, put_in_place, read_attribute, reason};
+use crate::results_file::{attribute, put_in_place, reason};
 use hdf5::types::FixedAscii;
 use hdf5::{Dataset, Extent, Group, H5Type};
 use std::path::Path;
+
+mod reading;
+
+pub use reading::{read_frame, read_series};
 
 /// What the cells of a frame are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -17,6 +21,8 @@ pub enum Cells {
     Points,
     /// Points 2 k and 2 k + 1 are the ends of line k.
     Lines,
+    /// Points 3 k to 3 k + 2 go round triangle k.
+    Triangles,
     /// Points 4 k to 4 k + 3 go round quadrilateral k.
     Quadrilaterals,
 }
@@ -28,6 +34,8 @@ pub enum Values {
     Scalars(Vec<f64>),
     /// Vectors.
     Vectors(Vec<[f64; 3]>),
+    /// Quaternions of unit length, real part first: how something is turned.
+    Quaternions(Vec<[f64; 4]>),
     /// Whole numbers.
     Counts(Vec<i64>),
 }
@@ -66,14 +74,16 @@ impl Cells {
         match self {
             Cells::Points => 0,
             Cells::Lines => 1,
-            Cells::Quadrilaterals => 2,
+            Cells::Triangles | Cells::Quadrilaterals => 2,
         }
     }
 
-    fn points_each(self) -> usize {
+    /// Points of a cell.
+    pub fn points_each(self) -> usize {
         match self {
             Cells::Points => 1,
             Cells::Lines => 2,
+            Cells::Triangles => 3,
             Cells::Quadrilaterals => 4,
         }
     }
@@ -82,7 +92,7 @@ impl Cells {
     fn data(self) -> &'static str {
         match self {
             Cells::Points => "PointData",
-            Cells::Lines | Cells::Quadrilaterals => "CellData",
+            Cells::Lines | Cells::Triangles | Cells::Quadrilaterals => "CellData",
         }
     }
 }
@@ -157,101 +167,6 @@ pub fn write(
     put_in_place(&partial, path).map_err(|error| failed(error.to_string()))
 }
 
-/// Reads a file of one frame that [`write()`] has written.
-pub fn read_frame(path: &Path) -> Result<Frame, Failure> {
-    read_one(path).map_err(|error| {
-        let (path, reason) = (path.display(), reason(&error));
-        Failure::Run(format!("cannot read the frame {path}: {reason}"))
-    })
-}
-
-/// Reads all frames of a file that [`write()`] has written.
-pub fn read_series(path: &Path) -> Result<Vec<Frame>, Failure> {
-    read(path).map_err(|error| {
-        let (path, reason) = (path.display(), reason(&error));
-        Failure::Run(format!("cannot read the series {path}: {reason}"))
-    })
-}
-
-fn read_one(path: &Path) -> hdf5::Result<Frame> {
-    let mut frames = read(path)?;
-    match (frames.pop(), frames.len()) {
-        (Some(frame), 0) => Ok(frame),
-        (_, before) => Err(format!("{} steps instead of one", before + 1).into()),
-    }
-}
-
-fn read(path: &Path) -> hdf5::Result<Vec<Frame>> {
-    let root = hdf5::File::open(path)?.group("VTKHDF")?;
-    // There may be no cells at this instant; the fields are over something nevertheless.
-    let corners: Vec<i64> = root.dataset("Polygons/Connectivity")?.read_raw()?;
-    let cells = if !corners.is_empty() {
-        Cells::Quadrilaterals
-    } else if root.link_exists(Cells::Lines.data()) {
-        Cells::Lines
-    } else {
-        Cells::Points
-    };
-    let times: Vec<f64> = root.dataset("Steps/Values")?.read_raw()?;
-    let sizes: Vec<i64> = root.dataset("NumberOfPoints")?.read_raw()?;
-    if sizes.len() != times.len() {
-        return Err(format!("{} steps, but points of {}", times.len(), sizes.len()).into());
-    }
-    let all = vectors(&root.dataset("Points")?)?;
-    let mut frames = Vec::with_capacity(times.len());
-    let mut begin = 0;
-    for (&time, &size) in times.iter().zip(&sizes) {
-        let end = begin + usize::try_from(size).map_err(|e| e.to_string())?;
-        let points = all.get(begin..end).ok_or("points are missing")?.to_vec();
-        frames.push(Frame {
-            time,
-            cells,
-            points,
-            fields: Vec::new(),
-        });
-        begin = end;
-    }
-    let data = root.group(cells.data())?;
-    for name in data.member_names()? {
-        let dataset = data.dataset(&name)?;
-        let unit: String = read_attribute(&dataset, "unit")?;
-        let whole = if dataset.dtype()?.is::<i64>() {
-            Values::Counts(dataset.read_raw()?)
-        } else if dataset.ndim() == 2 {
-            Values::Vectors(vectors(&dataset)?)
-        } else {
-            Values::Scalars(dataset.read_raw()?)
-        };
-        let mut begin = 0;
-        for frame in &mut frames {
-            let end = begin + frame.cell_count();
-            let values = whole.part(begin..end).ok_or("values are missing")?;
-            begin = end;
-            frame.fields.push(Field {
-                name: name.clone(),
-                unit: unit.clone(),
-                values,
-            });
-        }
-    }
-    Ok(frames)
-}
-
-impl Values {
-    /// Some of them.
-    fn part(&self, range: std::ops::Range<usize>) -> Option<Values> {
-        Some(match self {
-            Values::Scalars(v) => Values::Scalars(v.get(range)?.to_vec()),
-            Values::Vectors(v) => Values::Vectors(v.get(range)?.to_vec()),
-            Values::Counts(v) => Values::Counts(v.get(range)?.to_vec()),
-        })
-    }
-}
-
-fn vectors(dataset: &Dataset) -> hdf5::Result<Vec<[f64; 3]>> {
-    Ok(dataset.read_raw::<f64>()?.as_chunks::<3>().0.to_vec())
-}
-
 /// A file in the making.
 struct Series {
     root: Group,
@@ -299,6 +214,7 @@ impl Series {
             let dataset = match field.values {
                 Values::Scalars(_) => list::<f64>(&data, &field.name)?,
                 Values::Vectors(_) => table::<f64>(&data, &field.name, 3)?,
+                Values::Quaternions(_) => table::<f64>(&data, &field.name, 4)?,
                 Values::Counts(_) => counts(&data, &field.name)?,
             };
             attribute(&dataset, "unit", &field.unit)?;
@@ -359,6 +275,7 @@ impl Series {
             match &field.values {
                 Values::Scalars(values) => push(&dataset, values)?,
                 Values::Vectors(values) => push_rows(&dataset, values)?,
+                Values::Quaternions(values) => push_rows(&dataset, values)?,
                 Values::Counts(values) => push(&dataset, values)?,
             }
         }
@@ -414,71 +331,4 @@ fn push_rows<T: H5Type, const N: usize>(to: &Dataset, rows: &[[T; N]]) -> hdf5::
 }
 
 #[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn frame(time: f64, points: usize, cells: Cells) -> Frame {
-        let count = points / cells.points_each();
-        let scalars = (0..count).map(|k| time + k as f64).collect();
-        Frame {
-            time,
-            cells,
-            points: (0..points).map(|k| [k as f64, time, -1.0]).collect(),
-            fields: vec![
-                Field {
-                    name: "id".into(),
-                    unit: "1".into(),
-                    values: Values::Counts((0..count as i64).collect()),
-                },
-                Field {
-                    name: "radius".into(),
-                    unit: "m".into(),
-                    values: Values::Scalars(scalars),
-                },
-                Field {
-                    name: "velocity".into(),
-                    unit: "m/s".into(),
-                    values: Values::Vectors(vec![[time, 2.0, 3.0]; count]),
-                },
-            ],
-        }
-    }
-
-    #[test]
-    fn a_frame_reads_back() {
-        let folder = tempfile::tempdir().unwrap();
-        for (cells, points) in [(Cells::Points, 8), (Cells::Lines, 8), (Cells::Lines, 0)] {
-            let path = folder.path().join("frame.vtkhdf");
-            write(&path, [Ok(frame(0.5, points, cells))]).unwrap();
-            assert_eq!(read_frame(&path).unwrap(), frame(0.5, points, cells));
-        }
-    }
-
-    #[test]
-    fn a_failing_frame_leaves_the_file_before() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("grains.vtkhdf");
-        write(&path, [Ok(frame(0.5, 8, Cells::Points))]).unwrap();
-        let lost = Err(Failure::Run("lost".into()));
-        let error = write(&path, [Ok(frame(1.0, 4, Cells::Points)), lost]).unwrap_err();
-        assert!(error.to_string().contains("lost"), "{error}");
-        assert_eq!(read_frame(&path).unwrap().time, 0.5);
-        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
-    }
-
-    #[test]
-    fn a_series_is_not_a_frame_and_neither_is_rubbish() {
-        let folder = tempfile::tempdir().unwrap();
-        let path = folder.path().join("grains.vtkhdf");
-        let both = [0.0, 1.0].map(|t| Ok(frame(t, 6, Cells::Points)));
-        write(&path, both).unwrap();
-        assert!(
-            read_frame(&path)
-                .unwrap_err()
-                .to_string()
-                .contains("2 steps")
-        );
-        std::fs::write(&path, "rubbish").unwrap();
-        assert!(read_frame(&path).is_err());
-    }
-}
+mod tests;

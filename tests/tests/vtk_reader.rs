@@ -8,14 +8,15 @@
 use colluvium::frames;
 use colluvium::vtkhdf;
 use colluvium_dem::{
-    ContactLaw, Domain, Grain, Hooke, Setup, Simulation, Snapshot, TangentialSpring, Threads, Wall,
+    Body, Clump, ContactLaw, Domain, Grain, Hooke, Part, Pose, Setup, Simulation, Snapshot,
+    TangentialSpring, Threads, Wall,
 };
-use nalgebra::Vector3;
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use std::path::{Path, PathBuf};
 use std::process::Command;
 use std::sync::Mutex;
 
-/// Prints, for every step of a series, time, points, cells and the sums of all arrays.
+/// Prints, for every step of a series, time, points, cells, their corners, and lengths, widths and sums of all arrays.
 const READER: &str = r#"
 import sys
 from vtkmodules.vtkIOHDF import vtkHDFReader
@@ -29,11 +30,13 @@ for step in range(steps):
     reader.Update()
     data = reader.GetOutput()
     points = vtk_to_numpy(data.GetPoints().GetData()).sum()
-    print("step", reader.GetTimeValue(), data.GetNumberOfPoints(), data.GetNumberOfCells(), repr(float(points)))
+    corners = sum(of.GetNumberOfConnectivityIds() for of in (data.GetVerts(), data.GetLines(), data.GetPolys()))
+    print("step", reader.GetTimeValue(), data.GetNumberOfPoints(), data.GetNumberOfCells(), corners, repr(float(points)))
     for of in (data.GetPointData(), data.GetCellData()):
         for k in range(of.GetNumberOfArrays()):
             array = of.GetArray(k)
-            print(array.GetName(), array.GetNumberOfTuples(), repr(float(vtk_to_numpy(array).sum())))
+            numbers = vtk_to_numpy(array)
+            print(array.GetName(), *(numbers.shape + (1,))[:2], repr(float(numbers.sum())))
 "#;
 
 fn has_vtk(python: &Path) -> bool {
@@ -70,8 +73,12 @@ fn python() -> Option<PathBuf> {
     (made && has_vtk(&installed)).then_some(installed)
 }
 
-/// Grains that fall on a floor, some of them bonded.
+/// Grains that fall on a floor.
 fn rain() -> Simulation {
+    Simulation::new(rain_setup()).unwrap()
+}
+
+fn rain_setup() -> Setup {
     let mut grains = Vec::new();
     for k in 0..60_u32 {
         let cell = Vector3::new(f64::from(k % 4), f64::from(k / 4 % 4), f64::from(k / 16));
@@ -84,7 +91,7 @@ fn rain() -> Simulation {
         TangentialSpring::matched(2.0 / 7.0, 0.6, 0.5),
         None,
     );
-    let setup = Setup {
+    Setup {
         domain: Domain {
             lower: Vector3::zeros(),
             upper: Vector3::new(4.08, 4.08, 20.0),
@@ -97,19 +104,19 @@ fn rain() -> Simulation {
         bodies: Vec::new(),
         timestep: 1e-4,
         threads: Threads::Serial,
-    };
-    Simulation::new(setup).unwrap()
+    }
 }
 
-/// What the reader should print for a frame.
-fn expected(frame: &vtkhdf::Frame) -> Vec<(String, f64, f64)> {
+/// What the reader should print for a frame: names, lengths, widths and sums.
+fn expected(frame: &vtkhdf::Frame) -> Vec<(String, usize, usize, f64)> {
     let fields = frame.fields.iter().map(|field| {
-        let (count, sum) = match &field.values {
-            vtkhdf::Values::Scalars(values) => (values.len(), values.iter().sum()),
-            vtkhdf::Values::Vectors(values) => (values.len(), values.iter().flatten().sum()),
-            vtkhdf::Values::Counts(values) => (values.len(), values.iter().sum::<i64>() as f64),
+        let (count, width, sum) = match &field.values {
+            vtkhdf::Values::Scalars(values) => (values.len(), 1, values.iter().sum()),
+            vtkhdf::Values::Vectors(values) => (values.len(), 3, values.iter().flatten().sum()),
+            vtkhdf::Values::Quaternions(values) => (values.len(), 4, values.iter().flatten().sum()),
+            vtkhdf::Values::Counts(values) => (values.len(), 1, values.iter().sum::<i64>() as f64),
         };
-        (field.name.clone(), count as f64, sum)
+        (field.name.clone(), count, width, sum)
     });
     fields.collect()
 }
@@ -140,26 +147,28 @@ fn check(python: &Path, path: &Path, frames: &[vtkhdf::Frame]) {
         let points_each = match frame.cells {
             vtkhdf::Cells::Points => 1,
             vtkhdf::Cells::Lines => 2,
+            vtkhdf::Cells::Triangles => 3,
             vtkhdf::Cells::Quadrilaterals => 4,
         };
-        let cells = frame.points.len() / points_each;
+        let points = frame.points.len();
+        let cells = points / points_each;
         let sum: f64 = frame.points.iter().flatten().sum();
         let close = |a: f64, b: f64| (a - b).abs() <= 1e-9 * (1.0 + b.abs());
         assert_eq!(
-            head[..3],
-            [frame.time, frame.points.len() as f64, cells as f64]
+            head[..4],
+            [frame.time, points as f64, cells as f64, points as f64]
         );
-        assert!(close(head[3], sum), "points: {} against {sum}", head[3]);
+        assert!(close(head[4], sum), "points: {} against {sum}", head[4]);
         let read: Vec<Vec<&str>> = lines.map(|line| line.split(' ').collect()).collect();
         let expected = expected(frame);
         assert_eq!(read.len(), expected.len(), "{text}");
-        for (name, count, sum) in expected {
+        for (name, count, width, sum) in expected {
             let line = read.iter().find(|line| line[0] == name).unwrap();
-            assert_eq!(line[1].parse::<f64>().unwrap(), count, "{name}");
+            assert_eq!(line[1..3], [count.to_string(), width.to_string()], "{name}");
             assert!(
-                close(line[2].parse().unwrap(), sum),
+                close(line[3].parse().unwrap(), sum),
                 "{name}: {} against {sum}",
-                line[2]
+                line[3]
             );
         }
     }
@@ -193,6 +202,114 @@ fn vtk_reads_grains_and_contacts_through_time() {
             Some(python) => check(python, &path, frames),
             None => eprintln!("{name}: no Python with VTK here, and none could be installed"),
         }
+    }
+}
+
+/// Rain in clumps of two and three, with two bodies that turn among them.
+fn hail() -> Simulation {
+    let mut setup = rain_setup();
+    let cuboid = Part::cuboid(Vector3::new(0.5, 0.3, 0.2), 1500.0);
+    let ball = Part::sphere(0.3, 900.0).at(Vector3::new(0.0, 0.0, 0.4));
+    for (k, parts) in [vec![cuboid], vec![ball]].into_iter().enumerate() {
+        let mut body = Body::new(parts);
+        body.pose = Pose::at(Vector3::new(1.0 + 2.0 * k as f64, 2.0, 6.0));
+        body.spin = Vector3::new(3.0, 2.0, -1.0);
+        setup.bodies.push(body);
+    }
+    let mut hail = Simulation::new(setup).unwrap();
+    let clump = |grains: &[u32]| Clump {
+        grains: grains.to_vec(),
+        mass: None,
+    };
+    let clumps = [&[7, 6][..], &[20, 21, 25], &[40, 41]].map(clump);
+    hail.clump(&clumps).unwrap();
+    hail
+}
+
+fn quaternions(frame: &vtkhdf::Frame) -> Vec<UnitQuaternion<f64>> {
+    let field = frame.fields.iter().find(|f| f.name == "orientation");
+    let vtkhdf::Values::Quaternions(values) = &field.unwrap().values else {
+        panic!("no quaternions")
+    };
+    let unit =
+        |q: &[f64; 4]| UnitQuaternion::new_unchecked(Quaternion::new(q[0], q[1], q[2], q[3]));
+    values.iter().map(unit).collect()
+}
+
+/// Places, orientations and velocities in the files are those of rigid bodies: what is on the surface of a body,
+/// and the grains of a clump, are carried by them.
+#[test]
+fn vtk_reads_bodies_and_clumps_through_time() {
+    let _alone = ONE_AT_A_TIME.lock();
+    let folder = tempfile::tempdir().unwrap();
+    let mut hail = hail();
+    let total = 240;
+    let frames = frames::Frames::new(folder.path(), total, 3).with_rigid(true, true);
+    let mut snapshot = Snapshot::default();
+    let mut written = [Vec::new(), Vec::new(), Vec::new()];
+    loop {
+        frames.take(&mut hail, &mut snapshot).unwrap();
+        hail.snapshot(&mut snapshot);
+        written[0].push(frames::rigid::bodies(&hail, &snapshot));
+        written[1].push(frames::rigid::clumps(&mut hail));
+        written[2].push(frames::grains(&snapshot, &hail.clusters()));
+        let Some(next) = frames.next(hail.steps_done()) else {
+            break;
+        };
+        hail.advance(next - hail.steps_done()).unwrap();
+    }
+    frames.join(total).unwrap();
+    let python = python();
+    for (name, frames) in frames::RIGID.into_iter().chain(["grains"]).zip(&written) {
+        let path = folder.path().join(format!("{name}.vtkhdf"));
+        let read = vtkhdf::read_series(&path).unwrap();
+        assert_eq!(read.len(), 4);
+        for (read, written) in read.iter().zip(frames) {
+            assert_eq!((&read.points, read.cells), (&written.points, written.cells));
+        }
+        match &python {
+            Some(python) => check(python, &path, frames),
+            None => eprintln!("{name}: no Python with VTK here, and none could be installed"),
+        }
+    }
+    let [bodies, clumps, grains] = &written;
+    let v = |x: &[f64; 3]| Vector3::from(*x);
+    // The surface as it was at the start, carried by centre and orientation.
+    let (first, last) = (&bodies[0], &bodies[3]);
+    let (from, to) = (quaternions(first), quaternions(last));
+    let centres = [first, last].map(|frame| frame.vectors("centre").unwrap());
+    assert!((v(&centres[1][0]) - v(&centres[0][0])).norm() > 1e-3);
+    assert!(from[0].angle_to(&to[0]) > 0.05);
+    for (k, point) in last.points.iter().enumerate() {
+        let cell = k / 3;
+        let arm = from[cell].inverse() * (v(&first.points[k]) - v(&centres[0][cell]));
+        let carried = v(&centres[1][cell]) + to[cell] * arm;
+        assert!((carried - v(point)).norm() < 1e-12, "corner {k}");
+    }
+    let numbers = last.counts("body").unwrap();
+    assert_eq!((numbers[0], numbers[numbers.len() - 1]), (0, 1));
+    // Grains by their clumps, from the first frame to the last.
+    let number = grains[3].counts("clump").unwrap();
+    let members = number.iter().filter(|&&clump| clump >= 0).count();
+    assert_eq!(members, 7);
+    let cluster = grains[3].counts("cluster").unwrap();
+    assert_eq!((cluster[6], cluster[7], cluster[25]), (6, 6, 20));
+    let known = clumps[3].counts("clump").unwrap();
+    assert_eq!(known, [7, 20, 40]);
+    assert_eq!(clumps[3].counts("grains").unwrap(), [2, 3, 2]);
+    let turns = [0, 3].map(|at: usize| quaternions(&clumps[at]));
+    let (velocity, spin) = (
+        clumps[3].vectors("velocity").unwrap(),
+        clumps[3].vectors("spin").unwrap(),
+    );
+    let own = grains[3].vectors("velocity").unwrap();
+    for (k, clump) in number.iter().enumerate().filter(|(_, clump)| **clump >= 0) {
+        let at = known.iter().position(|number| number == clump).unwrap();
+        let arm = |frame: usize| v(&grains[frame].points[k]) - v(&clumps[frame].points[at]);
+        let carried = turns[1][at] * (turns[0][at].inverse() * arm(0));
+        assert!((carried - arm(3)).norm() < 1e-12, "grain {k}");
+        let moved = v(&velocity[at]) + v(&spin[at]).cross(&arm(3));
+        assert!((moved - v(&own[k])).norm() < 1e-12, "grain {k}");
     }
 }
 

@@ -86,6 +86,7 @@ mod tests {
             radius: 0.5,
             mass: 1.0,
             fixed: false,
+            clump: None,
         };
         let contact = |n: &Vector3<f64>| ContactSample {
             grain: 0,

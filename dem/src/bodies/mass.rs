@@ -127,7 +127,7 @@ impl MassProperties {
     }
 
     /// Checks that some distribution of mass has these numbers.
-    pub(crate) fn validate(&self, key: &str) -> Result<(), SetupError> {
+    pub fn validate(&self, key: &str) -> Result<(), SetupError> {
         check(&format!("{key}.mass"), self.mass, "> 0 kg", |m| m > 0.0)?;
         for c in self.centre.iter() {
             check(&format!("{key}.centre"), *c, "finite, m", |_| true)?;

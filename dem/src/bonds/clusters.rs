@@ -1,4 +1,4 @@
-//! What hangs together by bonds: boulders.
+//! What hangs together by bonds and in clumps: boulders.
 //!
 //! Union–find over the whole bonds. Each grain keeps the way from the root of its cluster to itself, so
 //! that clusters across periodic boundaries have one shape.
@@ -9,7 +9,7 @@ use crate::simulation::Simulation;
 use nalgebra::Vector3;
 use serde::Serialize;
 
-/// Grains held together by bonds; a grain without bonds is a cluster of one.
+/// Grains held together by bonds or as a clump; a grain alone is a cluster of one.
 #[derive(Clone, Debug, PartialEq, Serialize)]
 pub struct Cluster {
     /// Lowest number of its grains.
@@ -171,7 +171,7 @@ impl Sums {
 }
 
 impl Simulation {
-    /// What hangs together by whole bonds now.
+    /// What hangs together by whole bonds now, and in clumps.
     pub fn clusters(&mut self) -> Clusters {
         self.observe();
         let (grains, cell) = (&self.grains, self.cell());
@@ -179,6 +179,10 @@ impl Simulation {
         let mut forest = Forest::new(n);
         for bond in self.bonds.whole() {
             let [i, j] = bond.rows.map(|row| row as usize);
+            let apart = vector(&grains.place[i]) - vector(&grains.place[j]);
+            forest.join(i, j, cell.nearest(apart).0);
+        }
+        for [i, j] in self.clumps.chains() {
             let apart = vector(&grains.place[i]) - vector(&grains.place[j]);
             forest.join(i, j, cell.nearest(apart).0);
         }

@@ -18,19 +18,23 @@
 
 mod accounts;
 mod changes;
+mod making;
 mod record;
+mod sample;
 mod step;
 mod turning;
 mod union;
+mod weight;
 
 use crate::bodies::MassProperties;
 use crate::domain::Domain;
 use crate::grains::{Grains, vector};
 use crate::neighbours::Neighbours;
-use crate::setup::{SetupError, check};
-use crate::simulation::Simulation;
-use nalgebra::{Matrix3, UnitQuaternion, Vector3};
+use nalgebra::{UnitQuaternion, Vector3};
 use std::ops::Range;
+
+pub use sample::ClumpSample;
+pub(crate) use weight::lightest;
 
 /// Grains that are to move as one.
 #[derive(Clone, Debug, PartialEq)]
@@ -40,27 +44,6 @@ pub struct Clump {
     /// Mass, centre of mass (m) and inertia tensor, in directions of space and at the places of its grains
     /// now; none: those of its grains as balls, which count twice where they overlap.
     pub mass: Option<MassProperties>,
-}
-
-/// A clump at one instant.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub struct ClumpSample {
-    /// Centre of mass (m), inside the box along periodic axes.
-    pub centre: Vector3<f64>,
-    /// Principal axes in space.
-    pub orientation: UnitQuaternion<f64>,
-    /// Velocity of the centre (m/s).
-    pub velocity: Vector3<f64>,
-    /// Angular velocity (rad/s).
-    pub spin: Vector3<f64>,
-    /// Angular momentum about the centre (kg m²/s).
-    pub angular_momentum: Vector3<f64>,
-    /// Mass (kg).
-    pub mass: f64,
-    /// Force of contacts and loads (N).
-    pub force: Vector3<f64>,
-    /// Kinetic energy of translation and rotation (J).
-    pub kinetic: [f64; 2],
 }
 
 /// Mark of a grain that is in no clump.
@@ -153,11 +136,25 @@ impl Clumps {
         self.of_row.get(row).is_some_and(|&clump| clump != ALONE)
     }
 
+    /// Number of the clump that carries the grain of a row: that of its first grain.
+    #[inline(always)]
+    pub fn number(&self, row: usize) -> Option<u32> {
+        let clump = *self.of_row.get(row).filter(|&&clump| clump != ALONE)?;
+        Some(self.one(clump as usize).1[0].grain)
+    }
+
     /// A clump with its members.
     fn one(&self, clump: usize) -> (&State, &[Member]) {
         let group = &self.groups[clump / self.each];
         let state = &group.states[clump % self.each];
         (state, &group.members[state.members.clone()])
+    }
+
+    /// Rows of members that follow each other in their clump.
+    pub fn chains(&self) -> impl Iterator<Item = [usize; 2]> {
+        let rows = |pair: &[Member]| [pair[0].row as usize, pair[1].row as usize];
+        self.all()
+            .flat_map(move |(_, own)| own.windows(2).map(rows))
     }
 
     /// All clumps with their members, in order.
@@ -259,155 +256,5 @@ impl Clumps {
                 });
             }
         }
-    }
-}
-
-impl Simulation {
-    /// Lets grains move as clumps from now on, each as its grains do in the mean: their spins, and their velocities
-    /// less the turning. Forces on the grains of this instant are not looked at.
-    ///
-    /// # Errors
-    /// If a grain is not there, is fixed, or is in a clump already, a clump has no grains, no distribution of
-    /// mass has such an inertia, or the box moves. Nothing has changed then.
-    pub fn clump(&mut self, clumps: &[Clump]) -> Result<(), SetupError> {
-        let moves = f64::from(u8::from(self.moving_box.drift.moves()));
-        let word = "a box at rest: clumps do not go through boundaries that move";
-        check("clumps: speed of the box", moves, word, |m| m == 0.0)?;
-        let mut rows: Vec<u32> = vec![ALONE; self.next_id as usize];
-        for (row, &id) in self.grains.id.iter().enumerate() {
-            let free = !self.grains.is_fixed(row) && !self.clumps.carry(row);
-            rows[id as usize] = if free { row as u32 } else { ALONE };
-        }
-        let mut made = Vec::new();
-        for (k, clump) in clumps.iter().enumerate() {
-            let key = format!("clumps[{k}]");
-            let count = clump.grains.len() as f64;
-            check(
-                &format!("{key}.grains, their number"),
-                count,
-                "≥ 1",
-                |n| n >= 1.0,
-            )?;
-            let mut own = Vec::new();
-            for &grain in &clump.grains {
-                let found = rows.get_mut(grain as usize);
-                let row = found.map_or(ALONE, |row| std::mem::replace(row, ALONE));
-                let word = "the number of a free grain that is in no clump yet";
-                check(&format!("{key}.grains"), f64::from(grain), word, |_| {
-                    row != ALONE
-                })?;
-                own.push((grain, row as usize));
-            }
-            made.push(self.make_clump(&own, clump.mass, &key)?);
-        }
-        self.forget_observation();
-        for (state, own) in &made {
-            let share = |m: &Member| self.grains.place[m.row as usize][3].powi(3);
-            let whole: f64 = own.iter().map(share).sum();
-            for member in own {
-                let share = share(member) / whole;
-                let row = member.row as usize;
-                self.grains.mass[row] = state.mass * share;
-                self.grains.motion[row][3] = 1.0 / state.mass;
-            }
-        }
-        let mut all = self.clumps.take();
-        all.append(&mut made);
-        self.clumps.lay(all);
-        self.clumps_changed();
-        Ok(())
-    }
-
-    /// A clump of grains by number and row.
-    fn make_clump(
-        &self,
-        of: &[(u32, usize)],
-        mass: Option<MassProperties>,
-        key: &str,
-    ) -> Result<(State, Vec<Member>), SetupError> {
-        let first = vector(&self.grains.place[of[0].1]);
-        let place = |row: usize| {
-            let apart = vector(&self.grains.place[row]) - first;
-            first + self.domain.nearest_image(apart)
-        };
-        let properties = mass.unwrap_or_else(|| {
-            let ball = |&(_, row): &(u32, usize)| {
-                let (m, radius) = (self.grains.mass[row], self.grains.place[row][3]);
-                MassProperties {
-                    mass: m,
-                    centre: place(row),
-                    inertia: Matrix3::identity() * (0.4 * m * radius * radius),
-                }
-            };
-            MassProperties::sum(&of.iter().map(ball).collect::<Vec<_>>())
-        });
-        properties.validate(key)?;
-        let (orientation, moments) = properties.principal();
-        // Grains are inside the box; a centre that is given may be beside it.
-        let centre = first + self.domain.nearest_image(properties.centre - first);
-        let spin_of = |row: usize| vector(&self.grains.turn[row]) * self.grains.turn[row][3];
-        let count = of.len() as f64;
-        let spin = of
-            .iter()
-            .map(|&(_, row)| spin_of(row))
-            .sum::<Vector3<f64>>()
-            / count;
-        let drift = |&(_, row): &(u32, usize)| {
-            vector(&self.grains.motion[row]) - spin.cross(&(place(row) - centre))
-        };
-        let velocity = of.iter().map(drift).sum::<Vector3<f64>>() / count;
-        let own = orientation.inverse_transform_vector(&spin);
-        let state = State {
-            mass: properties.mass,
-            moments,
-            place: centre,
-            orientation,
-            velocity,
-            momentum: orientation * own.component_mul(&moments),
-            members: 0..of.len(),
-        };
-        let member = |&(grain, row): &(u32, usize)| {
-            let arm = place(row) - centre;
-            Member {
-                grain,
-                row: row as u32,
-                at: orientation.inverse_transform_vector(&arm),
-                arm,
-                ..Member::default()
-            }
-        };
-        Ok((state, of.iter().map(member).collect()))
-    }
-
-    /// Number of clumps.
-    pub fn clump_count(&self) -> usize {
-        self.clumps.count()
-    }
-
-    /// All clumps at this instant, in the order in which they were made.
-    pub fn clump_samples(&mut self) -> Vec<ClumpSample> {
-        self.observe();
-        let half = self.half_step();
-        let sample = |(state, own): (&State, &[Member])| {
-            let [force, _] = self.clump_load(own);
-            let (velocity, momentum) = self.clump_kicked(state, own, half);
-            ClumpSample {
-                centre: self.domain.wrap(state.place),
-                orientation: state.orientation,
-                velocity,
-                spin: state.spin(&momentum),
-                angular_momentum: momentum,
-                mass: state.mass,
-                force,
-                kinetic: state.kinetic(&velocity, &momentum),
-            }
-        };
-        self.clumps.all().map(sample).collect()
-    }
-
-    /// Numbers of the grains of each clump, in the order in which clumps were made.
-    pub fn clump_grains(&self) -> Vec<Vec<u32>> {
-        let numbers = |(_, own): (&State, &[Member])| own.iter().map(|m| m.grain).collect();
-        self.clumps.all().map(numbers).collect()
     }
 }

@@ -295,6 +295,7 @@ impl Cluster {
             },
             grains: self.places.iter().zip(&self.radii).map(grain).collect(),
             contacts: self.contacts,
+            clumps: Vec::new(),
         }
     }
 }

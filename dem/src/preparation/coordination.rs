@@ -106,6 +106,7 @@ mod tests {
             radius: 1.0,
             mass: 1.0,
             fixed,
+            clump: None,
         };
         let contact = |&(grain, partner): &(usize, Option<usize>)| ContactSample {
             grain,

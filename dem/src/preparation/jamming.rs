@@ -170,6 +170,7 @@ impl Jamming {
             domain,
             grains,
             contacts: Vec::new(),
+            clumps: Vec::new(),
         };
         Ok((packing, report.sizes))
     }

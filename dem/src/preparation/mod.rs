@@ -6,6 +6,7 @@
 //! asked for.
 
 mod aggregates;
+mod clump_pouring;
 mod compaction;
 mod coordination;
 mod incline_bed;
@@ -24,6 +25,7 @@ mod stages;
 mod stiffness;
 
 pub use aggregates::{Aggregate, AggregateReport, Growth, grow};
+pub use clump_pouring::{ClumpPouring, pour_clumps};
 pub use compaction::{CentralCompaction, CompactionReport, compact};
 pub use coordination::{Coordination, HELD_BY_FRICTION, HELD_FRICTIONLESS};
 pub use incline_bed::{Bed, BedReport, InclineBed, settle_incline_bed};

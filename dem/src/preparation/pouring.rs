@@ -82,6 +82,24 @@ pub fn pour(
     relaxation: &Relaxation,
     watch: Watch,
 ) -> Result<PouringReport, SetupError> {
+    let mut enter = |simulation: &mut Simulation, batch: &[Grain], _: &mut ChaCha8Rng| {
+        simulation.insert(batch).map(drop)
+    };
+    pour_by(simulation, spec, relaxation, watch, &mut enter)
+}
+
+/// Puts what stands for a batch into a simulation.
+pub(super) type Enter<'a> =
+    &'a mut dyn FnMut(&mut Simulation, &[Grain], &mut ChaCha8Rng) -> Result<(), SetupError>;
+
+/// The same with a way of its own in which a batch of balls comes in.
+pub(super) fn pour_by(
+    simulation: &mut Simulation,
+    spec: &Pouring,
+    relaxation: &Relaxation,
+    watch: Watch,
+    enter: Enter,
+) -> Result<PouringReport, SetupError> {
     let source = spec.source(simulation);
     source.validate()?;
     check("pouring.fill", spec.fill, "in (0, 0.3]", |v| {
@@ -101,7 +119,7 @@ pub fn pour(
             spec.fill * volume,
             &mut random,
         )?;
-        simulation.insert(&batch)?;
+        enter(simulation, &batch, &mut random)?;
         next += batch.len();
         batches += 1;
         blocked = if batch.is_empty() { blocked + 1 } else { 0 };

@@ -4,13 +4,13 @@ use super::ingredients::{Amount, Ingredient};
 use super::insertion::{Insertion, TRIES, insert_loose};
 use super::sizes::RadiusLaw;
 use crate::bodies::MassProperties;
-use crate::clumps::Clump;
+use crate::clumps::{Clump, lightest};
 use crate::domain::Domain;
 use crate::grains::Grain;
 use crate::region::Region;
 use crate::setup::{SetupError, check};
 use crate::walls::Pose;
-use nalgebra::{Matrix3, Quaternion, UnitQuaternion, Vector3};
+use nalgebra::{Quaternion, UnitQuaternion, Vector3};
 use rand::SeedableRng;
 use rand_chacha::ChaCha8Rng;
 use rand_distr::{Distribution, StandardNormal};
@@ -42,22 +42,53 @@ impl ClumpShape {
         self.balls.iter().map(far).fold(0.0, f64::max)
     }
 
-    /// Mass that a push through the middle of a ball feels at the least (kg): 1/m = 1/M + max n·A n over directions n,
-    /// A = ρ I⁻¹ ρᵀ with ρ v = r × v.
+    /// Mass that a push through the middle of a ball feels at the least (kg).
     pub fn lightest(&self) -> f64 {
-        let inverse = self
-            .mass
-            .inertia
-            .try_inverse()
-            .unwrap_or_else(Matrix3::zeros);
-        let lever = |(x, _): &(Vector3<f64>, f64)| {
-            let arm = (x - self.mass.centre).cross_matrix();
-            (arm * inverse * arm.transpose())
-                .symmetric_eigenvalues()
-                .max()
+        let arms = self.balls.iter().map(|(x, _)| x - self.mass.centre);
+        lightest(&self.mass, arms)
+    }
+
+    /// Its balls at a pose as grains, of a density such that a grain's mass is the least that a push on the clump
+    /// feels: what limits a step.
+    pub fn grains(&self, pose: &Pose, velocity: Vector3<f64>) -> Vec<Grain> {
+        let lightest = self.lightest();
+        let grain = |(place, radius): &(Vector3<f64>, f64)| {
+            let at = pose.position + pose.orientation * place;
+            let mut grain = Grain::at_rest(at, *radius, 1.0);
+            grain.density = lightest / grain.volume();
+            grain.velocity = velocity;
+            grain.material = self.material;
+            grain
         };
-        let most = self.balls.iter().map(lever).fold(0.0, f64::max);
-        1.0 / (1.0 / self.mass.mass + most)
+        self.balls.iter().map(grain).collect()
+    }
+
+    /// A pose that puts its centre of mass somewhere, turned at random.
+    pub(super) fn thrown(&self, centre: &Vector3<f64>, random: &mut ChaCha8Rng) -> Pose {
+        let mut normal = || StandardNormal.sample(random);
+        let q = Quaternion::new(normal(), normal(), normal(), normal());
+        let orientation = UnitQuaternion::from_quaternion(q);
+        Pose {
+            position: centre - orientation * self.mass.centre,
+            orientation,
+        }
+    }
+
+    /// The clump at a pose whose first grain has a number.
+    pub(super) fn clump(&self, pose: &Pose, first: u32) -> Clump {
+        Clump {
+            grains: (first..first + self.balls.len() as u32).collect(),
+            mass: Some(self.mass.put(pose)),
+        }
+    }
+
+    /// The ball about it as an ingredient.
+    pub(super) fn hull(&self) -> Ingredient {
+        let radii = RadiusLaw::List {
+            radii: vec![self.extent()],
+            shares: vec![1.0],
+        };
+        Ingredient::alone(radii, 1.0)
     }
 
     /// Checks its numbers.
@@ -103,8 +134,7 @@ pub struct Scattering {
 /// Clumps in place.
 #[derive(Clone, Debug)]
 pub struct Scattered {
-    /// Their grains, clump by clump. The density is such that a grain's mass is the least that a push on the clump
-    /// feels: what limits a step.
+    /// Their grains, clump by clump (see [`ClumpShape::grains`]).
     pub grains: Vec<Grain>,
     /// Clumps by the numbers of their grains.
     pub clumps: Vec<Clump>,
@@ -121,13 +151,7 @@ pub fn scatter(spec: &Scattering, among: &[Grain], first: u32) -> Result<Scatter
     let insertion = Insertion {
         region: spec.region.clone(),
         domain: spec.domain,
-        ingredients: vec![Ingredient::alone(
-            RadiusLaw::List {
-                radii: vec![spec.shape.extent()],
-                shares: vec![1.0],
-            },
-            1.0,
-        )],
+        ingredients: vec![spec.shape.hull()],
         amount: Amount::Grains(spec.count),
         gap: 0.0,
         velocity: spec.velocity,
@@ -139,32 +163,16 @@ pub fn scatter(spec: &Scattering, among: &[Grain], first: u32) -> Result<Scatter
     let mut random = ChaCha8Rng::seed_from_u64(spec.seed);
     random.set_stream(1);
     let shape = &spec.shape;
-    let lightest = shape.lightest();
     let mut scattered = Scattered {
         grains: Vec::new(),
         clumps: Vec::new(),
         hulls,
     };
     for hull in &scattered.hulls {
-        let mut normal = || StandardNormal.sample(&mut random);
-        let q = Quaternion::new(normal(), normal(), normal(), normal());
-        let turn = UnitQuaternion::from_quaternion(q);
-        let pose = Pose {
-            position: hull.position - turn * shape.mass.centre,
-            orientation: turn,
-        };
+        let pose = shape.thrown(&hull.position, &mut random);
         let from = first + scattered.grains.len() as u32;
-        for (place, radius) in &shape.balls {
-            let mut grain = Grain::at_rest(pose.position + turn * place, *radius, 1.0);
-            grain.density = lightest / grain.volume();
-            grain.velocity = spec.velocity;
-            grain.material = shape.material;
-            scattered.grains.push(grain);
-        }
-        scattered.clumps.push(Clump {
-            grains: (from..from + shape.balls.len() as u32).collect(),
-            mass: Some(shape.mass.put(&pose)),
-        });
+        scattered.grains.extend(shape.grains(&pose, spec.velocity));
+        scattered.clumps.push(shape.clump(&pose, from));
     }
     Ok(scattered)
 }

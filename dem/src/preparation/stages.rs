@@ -9,6 +9,7 @@
 use super::relaxation::{Relaxation, Watch, relax};
 use super::rest::{Rest, RestMeasures};
 use super::stiffness::{self, MeanGrain};
+use crate::clumps::Clump;
 use crate::contact::{LawTable, Laws};
 use crate::grains::Grain;
 use crate::setup::{Setup, SetupError, check};
@@ -106,7 +107,7 @@ impl fmt::Display for StageReport {
     }
 }
 
-/// Lets the grains of a setup come to rest under each gravity in turn.
+/// Lets the grains of a setup, some of them as clumps, come to rest under each gravity in turn.
 ///
 /// The setup's step is not used, its laws up to a factor on their stiffness. The simulation is handed
 /// back under the last stage's laws, step and gravity, its time counted from that stage's beginning.
@@ -115,6 +116,7 @@ impl fmt::Display for StageReport {
 /// If a number is out of its range, a stage does not come to rest or the grains fly apart.
 pub fn settle_in_stages(
     mut setup: Setup,
+    clumps: &[Clump],
     stages: &Stages,
     watch: Watch,
 ) -> Result<(Simulation, Vec<StageReport>), SetupError> {
@@ -128,6 +130,9 @@ pub fn settle_in_stages(
     // Any will do: each stage sets its own before a step is made.
     setup.timestep = 1.0;
     let mut simulation = Simulation::new(setup)?;
+    if !clumps.is_empty() {
+        simulation.clump(clumps)?;
+    }
     let mut reports = Vec::new();
     for &g in &stages.gravities {
         let grains = simulation.grain_list();

@@ -6,5 +6,6 @@ mod beds;
 mod changes;
 mod impacts;
 mod motion;
+mod packings;
 mod scene;
 mod slopes;

@@ -206,6 +206,7 @@ fn rows(table: &Table) -> Result<Vec<Row>, String> {
                 mass: mass.map(|k| row[k]),
                 density: density.map(|k| row[k]),
                 fixed: false,
+                clump: None,
             }
         })
         .collect())

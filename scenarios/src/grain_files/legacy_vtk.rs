@@ -196,6 +196,7 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<Instant>, String> {
             mass: scalar(mass, k),
             density: scalar(density, k),
             fixed: false,
+            clump: None,
         })
         .collect();
     Ok(vec![Instant {

@@ -37,6 +37,8 @@ fn rows(frame: &Frame) -> Result<Vec<Row>, String> {
     let (id, fixed) = (frame.counts("id")?, frame.counts("fixed")?);
     let (radius, mass) = (frame.scalars("radius")?, frame.scalars("mass")?);
     let (velocity, spin) = (frame.vectors("velocity")?, frame.vectors("spin")?);
+    // Series of older versions have none.
+    let clump = frame.counts("clump").unwrap_or_default();
     Ok((0..frame.points.len())
         .map(|k| Row {
             id: id[k],
@@ -48,6 +50,7 @@ fn rows(frame: &Frame) -> Result<Vec<Row>, String> {
             mass: Some(mass[k]),
             density: None,
             fixed: fixed[k] != 0,
+            clump: clump.get(k).and_then(|&number| u32::try_from(number).ok()),
         })
         .collect())
 }

@@ -133,6 +133,7 @@ fn our_own_series_comes_back_as_it_was_seen() {
         radius: 0.5,
         mass: 2.0,
         fixed,
+        clump: (id > 0).then_some(1),
     };
     let arm = Vector3::new(0.45, 0.0, 0.0);
     let force = Vector3::new(-4.0, 1.0, 0.0);

@@ -250,6 +250,7 @@ impl Recipe for AngleOfReposeScene {
             domain: bed.domain,
             grains: bed.grains,
             contacts: Vec::new(),
+            clumps: Vec::new(),
         };
         shop.grain_steps += bed.report.grain_steps;
         shop.note(

@@ -151,6 +151,7 @@ mod tests {
                 grain(9.6, 0.5),
             ],
             contacts: Vec::new(),
+            clumps: Vec::new(),
         };
         part_faces(&mut packing);
         let places: Vec<f64> = packing.grains.iter().map(|g| g.position.x).collect();

@@ -69,9 +69,22 @@ impl Recipe for GrainsScene {
         }
         let mut keys = toml::Table::try_from(self).unwrap_or_default();
         for later in [
-            "duration", "packing", "velocity", "output", "bodies", "clumps", "bonds", "cracks",
+            "duration", "packing", "velocity", "output", "bodies", "bonds", "cracks",
         ] {
             keys.remove(later);
+        }
+        for clump in self.clumps.keys() {
+            if self.prepares(clump) {
+                // What it is; those that come afterwards do not matter.
+                for later in ["count", "within", "velocity"] {
+                    layers::remove(&mut keys, &format!("clumps.{clump}.{later}"));
+                }
+            } else {
+                layers::remove(&mut keys, &format!("clumps.{clump}"));
+            }
+        }
+        if !self.clumps.keys().any(|clump| self.prepares(clump)) {
+            keys.remove("clumps");
         }
         for step in ["seconds", "safety"] {
             layers::remove(&mut keys, &format!("timestep.{step}"));
@@ -88,7 +101,7 @@ impl Recipe for GrainsScene {
             shop.packing.domain = boundaries.domain(origin)?;
         }
         let around = self.around(shop.materials, origin)?;
-        steps::prepare(shop, &self.prepare, &around, origin)?;
+        steps::prepare(shop, &self.prepare, &self.clumps, &around, origin)?;
         if shop.packing.grains.is_empty() {
             // Bodies alone.
             return Ok(());
@@ -128,7 +141,9 @@ impl Recipe for GrainsScene {
         };
         let place = (domain, packing.grains.as_slice());
         let clumps = clumps(&self.clumps, materials, place, self.seed, origin)?;
-        (world.grains, world.clumps) = (clumps.grains, clumps.clumps);
+        world.grains = clumps.grains;
+        world.clumps.clone_from(&packing.clumps);
+        world.clumps.extend(clumps.clumps);
         for (name, crack) in &self.cracks {
             let section = format!("cracks.{name}.within");
             let at = Place {
@@ -150,14 +165,18 @@ impl Recipe for GrainsScene {
     fn expected(&self, materials: &Materials) -> Expected {
         let mean = &materials.ingredients[0].sizes;
         let volume = 4.0 / 3.0 * std::f64::consts::PI * mean.mean().powi(3);
+        let balls = |name: &String| self.clumps.get(name).map_or(1, |clump| clump.balls.len());
         let counts = self.prepare.iter().map(|step| match step.count {
-            Some(count) => count as f64,
+            Some(count) => (count * step.clumps.as_ref().map_or(1, balls)) as f64,
             None => step.mass.map_or(f64::NAN, |m| {
                 m / (materials.ingredients[0].density * volume)
             }),
         });
         let known: f64 = counts.filter(|n| n.is_finite()).sum();
-        let members = self.clumps.values().map(|c| c.count * c.balls.len());
+        let members = self
+            .clumps
+            .values()
+            .map(|c| c.count.unwrap_or(0) * c.balls.len());
         let known = known + members.sum::<usize>() as f64;
         Expected {
             grains: known,

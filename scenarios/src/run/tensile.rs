@@ -130,6 +130,7 @@ impl Recipe for TensileScene {
             domain: super::world::workshop::open_space(),
             grains: Vec::new(),
             contacts: Vec::new(),
+            clumps: Vec::new(),
         };
         for k in 0..self.samples {
             shop.seed = self.seed + k as u64;

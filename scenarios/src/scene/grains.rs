@@ -8,6 +8,7 @@ use super::world::{
     Materials, OutputKeys, Place, PrepareKeys, StepKeys, SurfaceKeys, Triple, WallKeys, materials,
 };
 use super::{LawKeys, SceneError};
+use colluvium_dem::BoxMotion;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 use std::collections::BTreeMap;
@@ -53,7 +54,7 @@ pub struct GrainsScene {
     /// Rigid bodies by name; they are put in after the preparation.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub bodies: BTreeMap<String, BodyKeys>,
-    /// Clumps of grains by name; they are put in after the preparation.
+    /// Clumps of grains by name; they are put in after the preparation, or by its steps.
     #[serde(default, skip_serializing_if = "BTreeMap::is_empty")]
     pub clumps: BTreeMap<String, ClumpKeys>,
     /// Bonds by name; they are made after the preparation.
@@ -117,10 +118,55 @@ impl GrainsScene {
         }
         for (k, step) in self.prepare.iter().enumerate() {
             let section = format!("prepare[{k}]");
-            step.step(Place {
+            let at = Place {
                 origin,
                 section: &section,
-            })?;
+            };
+            step.step(at)?;
+            if let Some(name) = step
+                .clumps
+                .as_ref()
+                .filter(|n| !self.clumps.contains_key(*n))
+            {
+                let known: Vec<&str> = self.clumps.keys().map(String::as_str).collect();
+                let allowed = format!("a name in [clumps]: {}", known.join(", "));
+                return Err(at.refuse("clumps", name, allowed));
+            }
+        }
+        let unused = |name: &&String| self.clumps[*name].count.is_none() && !self.prepares(name);
+        if let Some(name) = self.clumps.keys().find(unused) {
+            let section = format!("clumps.{name}");
+            let at = Place {
+                origin,
+                section: &section,
+            };
+            return Err(at.missing("count", "how many, or a step [[prepare]] that names them"));
+        }
+        self.check_clumps_in_box(origin)
+    }
+
+    /// Whether a step of the preparation puts clumps of a name in.
+    pub fn prepares(&self, clumps: &str) -> bool {
+        let mut named = self
+            .prepare
+            .iter()
+            .filter_map(|step| step.clumps.as_deref());
+        named.any(|name| name == clumps)
+    }
+
+    /// Clumps of the preparation meet the run's box only when it is done: too late to refuse them.
+    fn check_clumps_in_box(&self, origin: &str) -> Result<(), SceneError> {
+        let Some(boundaries) = &self.boundaries else {
+            return Ok(());
+        };
+        let clumps = self.prepare.iter().any(|step| step.clumps.is_some());
+        if clumps && boundaries.motion(origin)? != BoxMotion::Rest {
+            let at = Place {
+                origin,
+                section: "boundaries",
+            };
+            let allowed = "a box at rest: clumps do not go through boundaries that move";
+            return Err(at.refuse("motion", "a box that moves", allowed));
         }
         Ok(())
     }

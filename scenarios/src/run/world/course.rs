@@ -81,6 +81,7 @@ pub fn trial(materials: &Materials) -> Packing {
         domain: super::workshop::open_space(),
         grains,
         contacts: Vec::new(),
+        clumps: Vec::new(),
     }
 }
 
@@ -248,7 +249,9 @@ fn follow(run: Followed, under: &mut Under) -> Result<(), Failure> {
     let steer_every = recipe.steer_every(stand.setup.timestep).max(1);
     let bar = Bar::new(&under.scene.name);
     let mut seen = Snapshot::default();
-    let frames = Frames::new(under.directory.path(), steps, recipe.output().frames);
+    let world = &stand.world;
+    let frames = Frames::new(under.directory.path(), steps, recipe.output().frames)
+        .with_rigid(!world.bodies.is_empty(), !world.clumps.is_empty());
     let mut course = Course::On;
     if simulation.steps_done() == 0 {
         course = recipe.steer(simulation, state)?;
@@ -319,13 +322,7 @@ fn findings(
     under: &Under,
 ) -> Result<Findings, Failure> {
     let mut summary = Summary::begun(&under.scene.name, "run");
-    let members = ran
-        .stand
-        .world
-        .clumps
-        .iter()
-        .map(|clump| clump.grains.len());
-    let grains = (ran.packing.grains.len() + members.sum::<usize>()) as u64;
+    let grains = (ran.packing.grains.len() + ran.stand.world.grains.len()) as u64;
     let (taken, choice) = (ran.stand.setup.timestep, &ran.stand.choice);
     summary.model = Model {
         grains,

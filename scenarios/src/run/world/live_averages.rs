@@ -185,6 +185,7 @@ fn sample(grain: &Grain) -> GrainSample {
         radius: grain.radius,
         mass: grain.mass(),
         fixed: grain.fixed,
+        clump: None,
     }
 }
 

@@ -5,11 +5,15 @@ use crate::results_file::{attribute, put_in_place, read_attribute, reason};
 use crate::seal;
 use crate::summary::Note;
 use colluvium_dem::preparation::Packing;
-use colluvium_dem::{Domain, Grain};
-use nalgebra::Vector3;
+use colluvium_dem::{Clump, Domain, Grain, MassProperties};
+use nalgebra::{Matrix3, Vector3};
 use std::path::Path;
 
 const FORMAT: &str = "colluvium packing 1";
+/// That of packings with clumps, which earlier versions would take for loose grains.
+const WITH_CLUMPS: &str = "colluvium packing 2";
+/// Numbers of a clump: mass, centre, inertia tensor by columns.
+const OF_CLUMP: usize = 13;
 
 /// A packing and where it comes from.
 #[derive(Clone, Debug, PartialEq)]
@@ -89,6 +93,9 @@ fn write_arrays(path: &Path, scene: &str, stored: &Stored) -> hdf5::Result<()> {
     file.new_dataset_builder()
         .with_data(&contacts)
         .create("contacts")?;
+    if !stored.packing.clumps.is_empty() {
+        write_clumps(&file, &stored.packing.clumps)?;
+    }
     let domain = &stored.packing.domain;
     let numbers: Vec<f64> = domain.lower.iter().chain(&domain.upper).copied().collect();
     file.new_dataset_builder()
@@ -111,8 +118,63 @@ fn write_arrays(path: &Path, scene: &str, stored: &Stored) -> hdf5::Result<()> {
         .create("grain_steps")?
         .write_scalar(&stored.grain_steps)?;
     // Last, so that a file without it was not finished.
-    attribute(&file, "format", FORMAT)?;
+    let plain = stored.packing.clumps.is_empty();
+    attribute(&file, "format", if plain { FORMAT } else { WITH_CLUMPS })?;
     file.flush()
+}
+
+fn write_clumps(file: &hdf5::File, clumps: &[Clump]) -> hdf5::Result<()> {
+    let group = file.create_group("clumps")?;
+    let mut numbers = Vec::with_capacity(OF_CLUMP * clumps.len());
+    for clump in clumps {
+        let Some(mass) = &clump.mass else {
+            return Err(hdf5::Error::Internal("a clump without a mass".into()));
+        };
+        numbers.push(mass.mass);
+        numbers.extend(mass.centre.iter().chain(mass.inertia.iter()));
+    }
+    let counts: Vec<u64> = clumps.iter().map(|c| c.grains.len() as u64).collect();
+    let grains = clumps.iter().flat_map(|c| &c.grains);
+    let grains: Vec<u64> = grains.map(|&grain| u64::from(grain)).collect();
+    for (name, values) in [("count", &counts), ("grain", &grains)] {
+        group.new_dataset_builder().with_data(values).create(name)?;
+    }
+    let dataset = group
+        .new_dataset_builder()
+        .with_data(&numbers)
+        .create("mass")?;
+    attribute(
+        &dataset,
+        "unit",
+        "mass kg, centre m (3), inertia tensor kg m^2 (9)",
+    )
+}
+
+fn read_clumps(file: &hdf5::File) -> hdf5::Result<Vec<Clump>> {
+    if !file.link_exists("clumps") {
+        return Ok(Vec::new());
+    }
+    let group = file.group("clumps")?;
+    let counts = group.dataset("count")?.read_raw::<u64>()?;
+    let grains = group.dataset("grain")?.read_raw::<u64>()?;
+    let numbers = group.dataset("mass")?.read_raw::<f64>()?;
+    let fit = counts.iter().try_fold(0_u64, |sum, &n| sum.checked_add(n))
+        == Some(grains.len() as u64)
+        && numbers.len() == OF_CLUMP * counts.len();
+    if !fit {
+        return Err("clumps whose arrays do not fit each other".into());
+    }
+    let mut rest = grains.iter().map(|&g| u32::try_from(g).unwrap_or(u32::MAX));
+    let numbers = numbers.as_chunks::<OF_CLUMP>().0;
+    let clump = |(&count, of): (&u64, &[f64; OF_CLUMP])| Clump {
+        grains: rest.by_ref().take(count as usize).collect(),
+        mass: Some(MassProperties {
+            mass: of[0],
+            centre: Vector3::from_column_slice(&of[1..4]),
+            inertia: Matrix3::from_column_slice(&of[4..]),
+        }),
+    };
+    Ok(counts.iter().zip(numbers).map(clump).collect())
 }
 
 /// Reads a packing; says what is wrong with a truncated or foreign file.
@@ -124,7 +186,7 @@ pub fn read(path: &Path) -> Result<Stored, String> {
     let file = hdf5::File::open(path)
         .map_err(|error| format!("not a whole HDF5 file ({})", reason(&error)))?;
     match read_attribute(&file, "format") {
-        Ok(format) if format == FORMAT => {}
+        Ok(format) if [FORMAT, WITH_CLUMPS].contains(&format.as_str()) => {}
         Ok(format) => return Err(format!("not a packing of this program (format `{format}`)")),
         Err(_) => return Err("not a packing of this program (no format)".into()),
     }
@@ -176,6 +238,7 @@ fn read_arrays(file: &hdf5::File) -> hdf5::Result<Stored> {
             },
             grains: grains.collect(),
             contacts: pairs.map(|pair| pair.map(|i| i as u32)).collect(),
+            clumps: read_clumps(file)?,
         },
         materials: serde_json::from_str(&json("materials")?).map_err(|_| bad("materials"))?,
         provenance: json("provenance")?.parse().map_err(|_| bad("provenance"))?,
@@ -193,6 +256,22 @@ fn check(stored: &Stored) -> Result<(), String> {
         }
         if usize::from(grain.material) >= known {
             return Err(format!("grain {k} is of a material without a name"));
+        }
+    }
+    let mut taken = vec![false; stored.packing.grains.len()];
+    for (k, clump) in stored.packing.clumps.iter().enumerate() {
+        let mass = clump.mass.map_or(Err("no mass".to_owned()), |mass| {
+            mass.validate("mass").map_err(|error| error.to_string())
+        });
+        mass.map_err(|error| format!("clump {k}: {error}"))?;
+        let mut fresh = |&grain: &u32| {
+            let place = taken.get_mut(grain as usize);
+            place.is_some_and(|taken| !std::mem::replace(taken, true))
+        };
+        if clump.grains.is_empty() || !clump.grains.iter().all(&mut fresh) {
+            return Err(format!(
+                "clump {k} has no grains, or some that are not there or in another clump"
+            ));
         }
     }
     // A scene of bodies or clumps alone prepares none.
@@ -220,6 +299,7 @@ mod tests {
                 },
                 grains,
                 contacts: vec![[0, 2], [1, 2]],
+                clumps: Vec::new(),
             },
             materials: vec!["dust".into(), "ice".into()],
             provenance: "seed = 1\n[grains.dust]\ndensity = 2000.0".parse().unwrap(),
@@ -252,5 +332,35 @@ mod tests {
         strange.packing.grains[0].radius = f64::NAN;
         write(&path, "grains", &strange).unwrap();
         assert!(read(&path).unwrap_err().contains("grain 0"));
+    }
+
+    #[test]
+    fn clumps_read_back_to_the_bit_and_must_fit() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("packing.h5");
+        let mut stored = example();
+        let balls = [
+            (Vector3::zeros(), 0.01),
+            (Vector3::new(0.01, 0.003, 0.0), 0.007),
+        ];
+        let mut mass = MassProperties::of_balls(&balls, 900.0);
+        mass.centre += Vector3::new(0.1, -0.0, 1.0 / 3.0);
+        stored.packing.clumps = vec![Clump {
+            grains: vec![1, 0],
+            mass: Some(mass),
+        }];
+        write(&path, "grains", &stored).unwrap();
+        assert_eq!(read(&path).unwrap(), stored);
+        let refused = |change: &dyn Fn(&mut Clump)| {
+            let mut strange = stored.clone();
+            change(&mut strange.packing.clumps[0]);
+            write(&path, "grains", &strange).unwrap();
+            let error = read(&path).unwrap_err();
+            assert!(error.contains("clump 0"), "{error}");
+        };
+        refused(&|clump| clump.grains = vec![0, 3]);
+        refused(&|clump| clump.grains = vec![1, 1]);
+        refused(&|clump| clump.grains.clear());
+        refused(&|clump| clump.mass = Some(mass.scaled_to(-1.0)));
     }
 }

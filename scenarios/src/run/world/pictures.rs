@@ -2,15 +2,15 @@
 //! projection.
 
 pub(crate) mod canvas;
-mod facets;
 
 use super::recipe::Recipe;
+use crate::body_facets;
 use crate::failure::Failure;
 use crate::run_directory::RunDirectory;
 use crate::scene::world::Materials;
 use crate::summary::Figure;
 use canvas::{Ball, Plate};
-use colluvium_dem::{Body, Shape, Simulation};
+use colluvium_dem::{Body, Shape, Simulation, Snapshot};
 use nalgebra::Vector3;
 
 /// Colours of kinds and clusters, apart for the colour-blind (after Okabe & Ito).
@@ -27,7 +27,7 @@ pub const PALETTE: [[u8; 3]; 8] = [
 /// Colour of grains without a cluster, and of fixed ones.
 pub const PLAIN: [u8; 3] = [0xb4, 0xb4, 0xb4];
 /// Colour of bodies.
-const BODY: [u8; 3] = [0xe8, 0xe6, 0xe0];
+pub const BODY: [u8; 3] = [0xe8, 0xe6, 0xe0];
 /// Colours of rising speed (after viridis).
 const SPEEDS: [[f64; 3]; 5] = [
     [68.0, 1.0, 84.0],
@@ -37,11 +37,15 @@ const SPEEDS: [[f64; 3]; 5] = [
     [253.0, 231.0, 37.0],
 ];
 
+/// Corners of what is round of a body.
+const ROUND: usize = 48;
+
 /// What colours mean.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
 enum Colouring {
     Kinds,
     Speeds,
+    Clumps,
     Groups,
 }
 
@@ -50,6 +54,7 @@ impl Colouring {
         match self {
             Colouring::Kinds => "kinds",
             Colouring::Speeds => "speeds",
+            Colouring::Clumps => "clumps",
             Colouring::Groups => "groups",
         }
     }
@@ -100,7 +105,8 @@ impl<'a> Pictures<'a> {
             } else {
                 Colouring::Speeds
             };
-            return self.draw(simulation, first, &[]);
+            self.draw(simulation, first, &[])?;
+            return self.draw_clumps(simulation);
         }
         if step < steps && self.next(step - 1, steps) == step {
             self.draw(simulation, Colouring::Speeds, &[])?;
@@ -117,11 +123,19 @@ impl<'a> Pictures<'a> {
     ) -> Result<(), Failure> {
         if step > 0 {
             self.draw(simulation, Colouring::Speeds, &[])?;
+            self.draw_clumps(simulation)?;
         }
         match groups {
             Some(groups) => self.draw(simulation, Colouring::Groups, groups),
             None => Ok(()),
         }
+    }
+
+    fn draw_clumps(&self, simulation: &mut Simulation) -> Result<(), Failure> {
+        if simulation.clump_count() == 0 {
+            return Ok(());
+        }
+        self.draw(simulation, Colouring::Clumps, &[])
     }
 
     fn draw(
@@ -142,8 +156,13 @@ impl<'a> Pictures<'a> {
                 .filter(|g| !g.fixed)
                 .map(|g| g.velocity.norm()),
         );
+        let clumps = match colouring {
+            Colouring::Clumps => clumps_by_number(simulation),
+            _ => Vec::new(),
+        };
         let colour = |k: usize, grain: &colluvium_dem::Grain| match colouring {
             _ if grain.fixed => PLAIN,
+            Colouring::Clumps => clumps.get(k).copied().flatten().map_or(PLAIN, palette),
             Colouring::Kinds => PALETTE[usize::from(grain.material) % PALETTE.len()],
             Colouring::Speeds => {
                 speed_colour(grain.velocity.norm() / fastest.max(f64::MIN_POSITIVE))
@@ -175,6 +194,7 @@ impl<'a> Pictures<'a> {
                 .collect::<Vec<_>>()
                 .join(", "),
             Colouring::Speeds => format!("speed from 0 (violet) to {fastest:.3e} m/s (yellow)"),
+            Colouring::Clumps => "clumps, single grains grey".to_owned(),
             Colouring::Groups => "what hangs together, single grains grey".to_owned(),
         };
         let caption = format!("t = {:.4e} s; {text}", simulation.time());
@@ -190,13 +210,13 @@ impl<'a> Pictures<'a> {
 
     /// Surfaces of the bodies, in the picture's axes.
     fn plates(&self, simulation: &mut Simulation, axes: [Vector3<f64>; 3]) -> Vec<Plate> {
-        let plate = |facet: facets::Facet| Plate {
+        let plate = |facet: body_facets::Facet| Plate {
             corners: facet.map(|v| axes.map(|axis| v.dot(&axis))),
             colour: BODY,
         };
         let bodies = self.bodies.iter().enumerate();
         bodies
-            .flat_map(|(k, (_, body))| facets::of(body, &simulation.body(k).pose))
+            .flat_map(|(k, (_, body))| body_facets::of(body, &simulation.body(k).pose, ROUND))
             .map(plate)
             .collect()
     }
@@ -235,6 +255,21 @@ impl<'a> Pictures<'a> {
         };
         files.into_iter().map(figure).collect()
     }
+}
+
+/// Clump of each grain, in the order of the grains' numbers.
+fn clumps_by_number(simulation: &mut Simulation) -> Vec<Option<u32>> {
+    let mut seen = Snapshot::default();
+    simulation.snapshot(&mut seen);
+    seen.grains.sort_by_key(|grain| grain.id);
+    seen.grains.iter().map(|grain| grain.clump).collect()
+}
+
+/// A colour for a number of a clump or a cluster. These are numbers of first grains, often all multiples of one
+/// number, and are strewn over the palette (by the golden ratio, after Knuth).
+pub fn palette(number: u32) -> [u8; 3] {
+    let strewn = number.wrapping_mul(0x9e37_79b9);
+    PALETTE[(strewn >> 29) as usize % PALETTE.len()]
 }
 
 /// What the palette's colours are called.

@@ -2,10 +2,11 @@
 
 use super::workshop::{Surroundings, Workshop, with_friction};
 use crate::failure::Failure;
-use crate::scene::world::{Place, PrepareKeys, PrepareKind};
+use crate::scene::world::{ClumpKeys, Place, PrepareKeys, PrepareKind};
 use colluvium_dem::Wall;
-use colluvium_dem::preparation::{Aggregate, CentralCompaction, Relaxation, Stages};
+use colluvium_dem::preparation::{Aggregate, Amount, CentralCompaction, Relaxation, Stages};
 use nalgebra::{UnitQuaternion, Vector3};
+use std::collections::BTreeMap;
 
 /// Acceleration that rest is measured by where nothing pulls (m/s²).
 const NONE: f64 = 1e-3;
@@ -31,6 +32,7 @@ impl Around {
 pub fn prepare(
     shop: &mut Workshop,
     steps: &[PrepareKeys],
+    clumps: &BTreeMap<String, ClumpKeys>,
     around: &Around,
     origin: &str,
 ) -> Result<(), Failure> {
@@ -40,7 +42,7 @@ pub fn prepare(
             origin,
             section: &section,
         };
-        step(shop, keys, around, place)?;
+        step(shop, keys, clumps, around, place)?;
     }
     Ok(())
 }
@@ -48,6 +50,7 @@ pub fn prepare(
 fn step(
     shop: &mut Workshop,
     keys: &PrepareKeys,
+    clumps: &BTreeMap<String, ClumpKeys>,
     around: &Around,
     at: Place,
 ) -> Result<(), Failure> {
@@ -73,8 +76,28 @@ fn step(
     };
     let velocity = Vector3::from(keys.velocity.unwrap_or_default());
     let point = Vector3::from(keys.point.unwrap_or_default());
+    let shape = match keys
+        .clumps
+        .as_ref()
+        .and_then(|name| clumps.get_key_value(name))
+    {
+        Some((name, clump)) => {
+            let section = format!("clumps.{name}");
+            let own = Place {
+                section: &section,
+                ..at
+            };
+            Some(clump.shape(shop.materials, own)?)
+        }
+        None => None,
+    };
     match (keys.r#do, step.amount) {
-        (PrepareKind::Insert, Some(amount)) => shop.insert(step.region, amount, velocity),
+        (PrepareKind::Insert, Some(amount)) => match (shape, amount) {
+            (Some(shape), Amount::Grains(count)) => {
+                shop.insert_clumps(shape, (step.region, count), velocity)
+            }
+            _ => shop.insert(step.region, amount, velocity),
+        },
         (PrepareKind::Pour, Some(amount)) => {
             let surroundings = Surroundings {
                 speed: velocity.norm(),
@@ -82,6 +105,9 @@ fn step(
             };
             let how = (velocity, keys.interval);
             let rest = relaxation(acceleration);
+            if let (Some(shape), Amount::Grains(count)) = (shape, amount) {
+                return shop.pour_clumps(&surroundings, (shape, step.region, count), how, &rest);
+            }
             shop.pour(&surroundings, (step.region, amount), how, &rest)
         }
         (PrepareKind::Relax, _) => shop.relax(&surroundings, &relaxation(acceleration)),

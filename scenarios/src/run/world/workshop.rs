@@ -3,19 +3,20 @@
 //! A step takes the packing, puts it into a simulation with the law, the walls and the pull that it needs,
 //! and takes it back. It has a time step of its own, from its own speeds.
 
+use super::fragments;
 use crate::failure::Failure;
 use crate::journal::Journal;
 use crate::scene::world::Materials;
 use crate::summary::Note;
 use colluvium_dem::preparation::{
-    Aggregate, Amount, CentralCompaction, Insertion, Jamming, Packing, PackingReport, Pouring,
-    Relaxation, RestMeasures, Stages, TRIES, compact, grow, insert_loose, jam, pour, relax,
-    settle_in_stages,
+    Aggregate, Amount, CentralCompaction, ClumpPouring, ClumpShape, Insertion, Jamming, Packing,
+    PackingReport, Pouring, Relaxation, RestMeasures, Scattering, Stages, TRIES, compact, grow,
+    insert_loose, jam, pour, pour_clumps, relax, scatter, settle_in_stages,
 };
 use colluvium_dem::timestep::{Conditions, Shares};
 use colluvium_dem::{
-    BoxMotion, Domain, Edge, Grain, Laws, Mindlin, Normal, Region, Setup, SetupError, Simulation,
-    Tangential, TangentialSpring, Threads, Wall,
+    BoxMotion, Domain, Edge, Grain, Laws, Mindlin, Normal, Pose, Region, Setup, SetupError,
+    Simulation, Tangential, TangentialSpring, Threads, Wall,
 };
 use nalgebra::{UnitQuaternion, Vector3};
 use std::ops::ControlFlow;
@@ -36,6 +37,8 @@ pub struct Workshop<'a> {
     pub safety: f64,
     /// How steps are shared out.
     pub threads: Threads,
+    /// Grains that are still to come and must find a step that does for them, too: those of a clump.
+    coming: Vec<Grain>,
     journal: Option<&'a Journal>,
     watch: &'a mut dyn FnMut(&RestMeasures) -> ControlFlow<()>,
 }
@@ -158,7 +161,9 @@ impl<'a> Workshop<'a> {
                 domain: open_space(),
                 grains: Vec::new(),
                 contacts: Vec::new(),
+                clumps: Vec::new(),
             },
+            coming: Vec::new(),
             notes: Vec::new(),
             grain_steps: 0,
             materials,
@@ -201,6 +206,7 @@ impl<'a> Workshop<'a> {
             threads: self.threads,
         };
         let mut all = self.stand_ins();
+        all.extend(&self.coming);
         all.extend(&setup.grains);
         let fall = Conditions::of(&all, &around.gravity);
         let conditions = Conditions {
@@ -219,7 +225,11 @@ impl<'a> Workshop<'a> {
             .choose_step(&conditions, &shares)
             .map_err(refused)?
             .seconds;
-        Simulation::new(setup).map_err(refused)
+        let mut simulation = Simulation::new(setup).map_err(refused)?;
+        if !self.packing.clumps.is_empty() {
+            simulation.clump(&self.packing.clumps).map_err(refused)?;
+        }
+        Ok(simulation)
     }
 
     /// The smallest and the largest grain of each kind, at the origin: what limits are taken from where
@@ -256,6 +266,62 @@ impl<'a> Workshop<'a> {
         Ok(())
     }
 
+    /// Inserts clumps of a shape among what is there.
+    pub fn insert_clumps(
+        &mut self,
+        shape: ClumpShape,
+        (region, count): (Region, usize),
+        velocity: Vector3<f64>,
+    ) -> Result<(), Failure> {
+        let balls = shape.balls.len();
+        let spec = Scattering {
+            shape,
+            region,
+            domain: self.packing.domain,
+            count,
+            velocity,
+            seed: self.seed,
+        };
+        let among = &self.packing.grains;
+        let put = scatter(&spec, among, among.len() as u32).map_err(refused)?;
+        self.packing.grains.extend(put.grains);
+        self.packing.clumps.extend(put.clumps);
+        self.note("insert", format!("{count} clumps of {balls} balls"));
+        Ok(())
+    }
+
+    /// Pours clumps of a shape from a source until they rest.
+    pub fn pour_clumps(
+        &mut self,
+        around: &Surroundings,
+        (shape, source, count): (ClumpShape, Region, usize),
+        (velocity, interval): (Vector3<f64>, Option<f64>),
+        relaxation: &Relaxation,
+    ) -> Result<(), Failure> {
+        self.coming = shape.grains(&Pose::at(Vector3::zeros()), velocity);
+        let spec = ClumpPouring {
+            source,
+            shape,
+            count,
+            velocity,
+            interval,
+            fill: colluvium_dem::preparation::FILL,
+            seed: self.seed,
+        };
+        let mut simulation = self.simulation(around)?;
+        let report = pour_clumps(&mut simulation, &spec, relaxation, self.watch).map_err(ended)?;
+        self.take(simulation);
+        let balls = self.coming.drain(..).count();
+        self.note(
+            "pour",
+            format!(
+                "{count} clumps of {balls} balls poured in {} batches, {:.3e} s apart; {}",
+                report.batches, report.interval, report.rest
+            ),
+        );
+        Ok(())
+    }
+
     /// Pours grains from a source until they rest.
     pub fn pour(
         &mut self,
@@ -287,6 +353,39 @@ impl<'a> Workshop<'a> {
         self.take(simulation);
         self.note("relax", rest);
         Ok(())
+    }
+
+    /// Lets everything come to rest as far as it does in the time; says whether it does.
+    pub fn relax_as_far(
+        &mut self,
+        around: &Surroundings,
+        spec: &Relaxation,
+    ) -> Result<bool, Failure> {
+        let mut simulation = self.simulation(around)?;
+        let (rests, rest) = match relax(&mut simulation, spec, self.watch) {
+            Ok(rest) => (true, rest),
+            Err(SetupError::Restless { measures, .. }) => (false, *measures),
+            Err(error) => return Err(ended(error)),
+        };
+        self.take(simulation);
+        self.note("relax", rest);
+        Ok(rests)
+    }
+
+    /// Takes away what does not hang together, by contacts, with the heaviest piece; says how many grains.
+    pub fn keep_heaviest(&mut self) -> usize {
+        let grains = &self.packing.grains;
+        let masses: Vec<f64> = grains.iter().map(Grain::mass).collect();
+        let mut stays = vec![false; grains.len()];
+        let pieces = fragments::joined(&masses, &self.packing.contacts);
+        let heaviest = pieces.first().map_or(&[][..], |piece| &piece.grains);
+        heaviest.iter().for_each(|&grain| stays[grain] = true);
+        let gone = self.packing.keep_those(stays);
+        self.note(
+            "trim",
+            format!("{gone} grains taken away that did not hang on"),
+        );
+        gone
     }
 
     /// Lets the grains go for a time (s), and stops what still moves.
@@ -330,7 +429,7 @@ impl<'a> Workshop<'a> {
             threads: self.threads,
         };
         let (mut simulation, reports) =
-            settle_in_stages(setup, stages, self.watch).map_err(ended)?;
+            settle_in_stages(setup, &self.packing.clumps, stages, self.watch).map_err(ended)?;
         let grains = simulation.grain_count() as u64;
         for report in reports {
             self.grain_steps += report.steps * grains;

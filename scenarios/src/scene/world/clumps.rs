@@ -1,4 +1,5 @@
-//! Clumps of grains: `[clumps.NAME]`, balls that move as one, put in at random places when the grains are in place.
+//! Clumps of grains: `[clumps.NAME]`, balls that move as one. Those with a `count` are put in at random places when
+//! the grains are in place; steps `[[prepare]]` insert or pour them by name.
 
 use super::{Materials, Place, RegionKeys, Triple, region};
 use crate::failure::Failure;
@@ -28,10 +29,12 @@ pub struct ClumpKeys {
     /// Its balls; they may overlap.
     #[schemars(length(min = 1))]
     pub balls: Vec<BallKeys>,
-    /// How many clumps.
+    /// How many are put in after the preparation; left out: those of the steps `[[prepare]]` alone.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 1, "maximum" = 5000000))]
-    pub count: usize,
+    pub count: Option<usize>,
     /// Where they are put, at random, turned at random, clear of each other and of grains: where all of these are.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub within: Vec<RegionKeys>,
     /// Their velocity at the start (m/s); left out: at rest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -120,14 +123,18 @@ pub fn clumps(
             section: &within,
             ..at
         };
+        let shape = keys.shape(materials, at)?;
+        let Some(count) = keys.count else {
+            continue;
+        };
         if keys.within.is_empty() {
             return Err(at.missing("within", "regions: [{ shape, … }]").into());
         }
         let spec = Scattering {
-            shape: keys.shape(materials, at)?,
+            shape,
             region: region(&keys.within, region_at)?,
             domain,
-            count: keys.count,
+            count,
             velocity: keys.velocity.unwrap_or_default().into(),
             // A kind of its own numbers.
             seed: seed.wrapping_add(0x9e37_79b9_7f4a_7c15_u64.wrapping_mul(k as u64 + 1)),
@@ -135,8 +142,7 @@ pub fn clumps(
         let first = (among.len() + all.grains.len()) as u32;
         let put: Scattered = scatter(&spec, &taken, first).map_err(|error| {
             Failure::Input(format!(
-                "{origin}: key `clumps.{name}.count` = {}: {error}",
-                keys.count
+                "{origin}: key `clumps.{name}.count` = {count}: {error}"
             ))
         })?;
         taken.extend(put.hulls);

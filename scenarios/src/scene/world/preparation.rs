@@ -44,7 +44,10 @@ pub struct PrepareKeys {
     /// Where: where all of these are.
     #[serde(default, skip_serializing_if = "Vec::is_empty")]
     pub within: Vec<RegionKeys>,
-    /// Grains of insert, pour, jam and grow.
+    /// Clumps that insert and pour put in, by their name in `[clumps]`; left out: grains.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub clumps: Option<String>,
+    /// Grains of insert, pour, jam and grow; clumps of insert and pour, where they are of `clumps`.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 1, "maximum" = 20000000))]
     pub count: Option<usize>,
@@ -153,6 +156,16 @@ impl PrepareKeys {
             self.mass.map(Amount::Mass),
         ];
         let mut amount = None;
+        if self.clumps.is_some() && [Insert, Pour].contains(&kind) {
+            at.need(&self.count, "count", "a number of clumps")?;
+            at.unread(
+                &[
+                    ("solid_fraction", self.solid_fraction.is_some()),
+                    ("mass", self.mass.is_some()),
+                ],
+                "a step with `clumps`, which asks for their count",
+            )?;
+        }
         if [Insert, Pour].contains(&kind) {
             let mut given = amounts.into_iter().flatten();
             amount = given.next();
@@ -193,6 +206,7 @@ impl PrepareKeys {
                     only(self.solid_fraction.is_some(), &[Insert, Pour, Compact]),
                 ),
                 ("mass", only(self.mass.is_some(), &[Insert, Pour])),
+                ("clumps", only(self.clumps.is_some(), &[Insert, Pour])),
                 ("velocity", only(self.velocity.is_some(), &[Insert, Pour])),
                 ("interval", only(self.interval.is_some(), &[Pour])),
                 ("gravities", only(self.gravities.is_some(), &[Stages])),

@@ -1,46 +1,46 @@
-//! Surfaces of bodies as triangles for the pictures: sharp shapes, as their makers gave them.
+//! Surfaces of bodies as triangles, for pictures and series: sharp shapes, as their makers gave them.
 
 use colluvium_dem::{Body, Part, Pose, Solid};
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
 
-/// Corners of a circle, and of half a meridian of a ball.
-const ROUND: usize = 48;
-
 /// A triangle of space (m).
 pub type Facet = [Vector3<f64>; 3];
 
-/// Triangles of all parts of a body, at its pose now.
-pub fn of(body: &Body, pose: &Pose) -> Vec<Facet> {
+/// Triangles of all parts of a body, at its pose now; circles and half meridians of balls get so many corners.
+pub fn of(body: &Body, pose: &Pose, corners: usize) -> Vec<Facet> {
     let part = |part: &Part| -> Vec<Facet> {
         let place = |v: Vector3<f64>| {
             let own = part.pose.position + part.pose.outward(&v);
             pose.position + pose.outward(&own)
         };
-        let facets = solid(&part.solid).into_iter();
+        let facets = solid(&part.solid, corners).into_iter();
         facets.map(|facet| facet.map(place)).collect()
     };
     body.parts.iter().flat_map(part).collect()
 }
 
 /// Triangles of a solid in its own coordinates.
-fn solid(solid: &Solid) -> Vec<Facet> {
+fn solid(solid: &Solid, corners: usize) -> Vec<Facet> {
     match solid {
         Solid::Sphere { radius } => {
             let meridian = |k: usize| {
-                let angle = 0.5 * TAU * k as f64 / ROUND as f64;
+                let angle = 0.5 * TAU * k as f64 / corners as f64;
                 [radius * angle.sin(), radius * angle.cos()]
             };
-            let points: Vec<[f64; 2]> = (0..=ROUND).map(meridian).collect();
-            turned(&points)
+            let points: Vec<[f64; 2]> = (0..=corners).map(meridian).collect();
+            turned(&points, corners)
         }
         Solid::Cuboid { half_sides } => cuboid(half_sides),
-        Solid::Frustum { radii, height } => turned(&[
-            [0.0, 0.0],
-            [radii[0], 0.0],
-            [radii[1], *height],
-            [0.0, *height],
-        ]),
+        Solid::Frustum { radii, height } => {
+            let outline = [
+                [0.0, 0.0],
+                [radii[0], 0.0],
+                [radii[1], *height],
+                [0.0, *height],
+            ];
+            turned(&outline, corners)
+        }
         Solid::Mesh(mesh) => {
             let vertices = mesh.vertices();
             let corner = |k: u32| vertices[k as usize];
@@ -50,14 +50,14 @@ fn solid(solid: &Solid) -> Vec<Facet> {
 }
 
 /// The surface that a line of points (distance from the axis, height) sweeps about the axis z.
-fn turned(points: &[[f64; 2]]) -> Vec<Facet> {
+fn turned(points: &[[f64; 2]], corners: usize) -> Vec<Facet> {
     let at = |[r, z]: [f64; 2], k: usize| {
-        let angle = TAU * (k % ROUND) as f64 / ROUND as f64;
+        let angle = TAU * (k % corners) as f64 / corners as f64;
         Vector3::new(r * angle.cos(), r * angle.sin(), z)
     };
     let mut facets = Vec::new();
     for pair in points.windows(2) {
-        for k in 0..ROUND {
+        for k in 0..corners {
             let [a, b] = [at(pair[0], k), at(pair[0], k + 1)];
             let [c, d] = [at(pair[1], k), at(pair[1], k + 1)];
             facets.push([a, b, c]);
@@ -102,17 +102,17 @@ mod tests {
     #[test]
     fn areas_are_those_of_the_solids() {
         let half = Vector3::new(1.0, 2.0, 3.0);
-        let cuboid = area(&solid(&Solid::Cuboid { half_sides: half }));
+        let cuboid = area(&solid(&Solid::Cuboid { half_sides: half }, 48));
         assert!((cuboid - 8.0 * (2.0 + 6.0 + 3.0)).abs() < 1e-12);
-        let ball = area(&solid(&Solid::Sphere { radius: 2.0 }));
+        let ball = area(&solid(&Solid::Sphere { radius: 2.0 }, 48));
         assert!((ball / (16.0 * PI) - 1.0).abs() < 5e-3, "{ball}");
         let (radii, height) = ([2.0, 1.0], 3.0);
-        let stump = area(&solid(&Solid::Frustum { radii, height }));
+        let stump = area(&solid(&Solid::Frustum { radii, height }, 48));
         let exact = PI * (5.0 + 3.0 * 10f64.sqrt());
         assert!((stump / exact - 1.0).abs() < 5e-3, "{stump} {exact}");
         let part = Part::cuboid(half, 1.0).at(Vector3::x());
         let body = Body::new(vec![part]);
-        let moved = of(&body, &Pose::at(Vector3::new(10.0, 0.0, 0.0)));
+        let moved = of(&body, &Pose::at(Vector3::new(10.0, 0.0, 0.0)), 48);
         let far = moved.iter().flatten().map(|v| v.x);
         assert_eq!(far.fold(f64::NEG_INFINITY, f64::max), 12.0);
     }

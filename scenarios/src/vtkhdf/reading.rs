@@ -1,0 +1,116 @@
+//! Series read back.
+
+use super::{Cells, Field, Frame, Values};
+use crate::failure::Failure;
+use crate::results_file::{read_attribute, reason};
+use hdf5::Dataset;
+use std::path::Path;
+
+/// Reads a file of one frame that [`super::write()`] has written.
+pub fn read_frame(path: &Path) -> Result<Frame, Failure> {
+    read_one(path).map_err(|error| {
+        let (path, reason) = (path.display(), reason(&error));
+        Failure::Run(format!("cannot read the frame {path}: {reason}"))
+    })
+}
+
+/// Reads all frames of a file that [`super::write()`] has written.
+pub fn read_series(path: &Path) -> Result<Vec<Frame>, Failure> {
+    read(path).map_err(|error| {
+        let (path, reason) = (path.display(), reason(&error));
+        Failure::Run(format!("cannot read the series {path}: {reason}"))
+    })
+}
+
+fn read_one(path: &Path) -> hdf5::Result<Frame> {
+    let mut frames = read(path)?;
+    match (frames.pop(), frames.len()) {
+        (Some(frame), 0) => Ok(frame),
+        (_, before) => Err(format!("{} steps instead of one", before + 1).into()),
+    }
+}
+
+fn read(path: &Path) -> hdf5::Result<Vec<Frame>> {
+    let root = hdf5::File::open(path)?.group("VTKHDF")?;
+    // There may be no cells at this instant; the fields are over something nevertheless.
+    let all = |name: &str| -> hdf5::Result<i64> {
+        let counts = root
+            .dataset(&format!("Polygons/{name}"))?
+            .read_raw::<i64>()?;
+        Ok(counts.iter().sum())
+    };
+    let (corners, polygons) = (all("NumberOfConnectivityIds")?, all("NumberOfCells")?);
+    let cells = if polygons > 0 {
+        if corners == 3 * polygons {
+            Cells::Triangles
+        } else {
+            Cells::Quadrilaterals
+        }
+    } else if root.link_exists(Cells::Lines.data()) {
+        Cells::Lines
+    } else {
+        Cells::Points
+    };
+    let times: Vec<f64> = root.dataset("Steps/Values")?.read_raw()?;
+    let sizes: Vec<i64> = root.dataset("NumberOfPoints")?.read_raw()?;
+    if sizes.len() != times.len() {
+        return Err(format!("{} steps, but points of {}", times.len(), sizes.len()).into());
+    }
+    let all = vectors(&root.dataset("Points")?)?;
+    let mut frames = Vec::with_capacity(times.len());
+    let mut begin = 0;
+    for (&time, &size) in times.iter().zip(&sizes) {
+        let end = begin + usize::try_from(size).map_err(|e| e.to_string())?;
+        let points = all.get(begin..end).ok_or("points are missing")?.to_vec();
+        frames.push(Frame {
+            time,
+            cells,
+            points,
+            fields: Vec::new(),
+        });
+        begin = end;
+    }
+    let data = root.group(cells.data())?;
+    for name in data.member_names()? {
+        let dataset = data.dataset(&name)?;
+        let unit: String = read_attribute(&dataset, "unit")?;
+        let whole = if dataset.dtype()?.is::<i64>() {
+            Values::Counts(dataset.read_raw()?)
+        } else if dataset.ndim() == 2 && dataset.shape()[1] == 4 {
+            let numbers = dataset.read_raw::<f64>()?;
+            Values::Quaternions(numbers.as_chunks::<4>().0.to_vec())
+        } else if dataset.ndim() == 2 {
+            Values::Vectors(vectors(&dataset)?)
+        } else {
+            Values::Scalars(dataset.read_raw()?)
+        };
+        let mut begin = 0;
+        for frame in &mut frames {
+            let end = begin + frame.cell_count();
+            let values = whole.part(begin..end).ok_or("values are missing")?;
+            begin = end;
+            frame.fields.push(Field {
+                name: name.clone(),
+                unit: unit.clone(),
+                values,
+            });
+        }
+    }
+    Ok(frames)
+}
+
+impl Values {
+    /// Some of them.
+    fn part(&self, range: std::ops::Range<usize>) -> Option<Values> {
+        Some(match self {
+            Values::Scalars(v) => Values::Scalars(v.get(range)?.to_vec()),
+            Values::Vectors(v) => Values::Vectors(v.get(range)?.to_vec()),
+            Values::Quaternions(v) => Values::Quaternions(v.get(range)?.to_vec()),
+            Values::Counts(v) => Values::Counts(v.get(range)?.to_vec()),
+        })
+    }
+}
+
+fn vectors(dataset: &Dataset) -> hdf5::Result<Vec<[f64; 3]>> {
+    Ok(dataset.read_raw::<f64>()?.as_chunks::<3>().0.to_vec())
+}
