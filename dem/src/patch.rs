@@ -57,8 +57,22 @@ impl Patch {
             histories: histories.to_vec(),
             ..Self::default()
         };
-        for [id, x, y, z, u, v, w, a, b, c, radius, density, fixed, material] in
-            rows.as_chunks::<OF_A_GRAIN>().0
+        for [
+            id,
+            x,
+            y,
+            z,
+            u,
+            v,
+            w,
+            a,
+            b,
+            c,
+            radius,
+            density,
+            fixed,
+            material,
+        ] in rows.as_chunks::<OF_A_GRAIN>().0
         {
             patch.ids.push(*id as u32);
             patch.grains.push(Grain {

@@ -55,7 +55,10 @@ fn what_is_put_back_at_once_goes_on_as_before() {
         let before = whole.leapfrog_momentum();
         let patch = other.take_out(taken);
         assert!(patch.grains.len() > 100, "{name}: {}", patch.grains.len());
-        assert_eq!(other.grain_count() + patch.grains.len(), whole.grain_count());
+        assert_eq!(
+            other.grain_count() + patch.grains.len(),
+            whole.grain_count()
+        );
         let patch = Patch::of(&patch.numbers()).unwrap();
         other.put_back(&patch).unwrap();
         let back = other.leapfrog_momentum();
@@ -63,7 +66,10 @@ fn what_is_put_back_at_once_goes_on_as_before() {
         whole.advance(40).unwrap();
         other.advance(40).unwrap();
         let [x, v, spin] = apart(&mut whole, &mut other);
-        assert!(x < 1e-13 && v < 1e-10 && spin < 1e-8, "{name}: {x:e} {v:e} {spin:e}");
+        assert!(
+            x < 1e-13 && v < 1e-10 && spin < 1e-8,
+            "{name}: {x:e} {v:e} {spin:e}"
+        );
         assert!(other.momentum_error() < 1e-11, "{name}");
     }
 }
@@ -101,7 +107,11 @@ fn a_patch_of_another_run_is_refused() {
     };
     let mut short = patch.clone();
     short.histories.pop();
-    for (wrong, key) in [(&twice, "patch.ids"), (&never, "patch.ids"), (&short, "patch.histories")] {
+    for (wrong, key) in [
+        (&twice, "patch.ids"),
+        (&never, "patch.ids"),
+        (&short, "patch.histories"),
+    ] {
         let error = simulation.put_back(wrong).unwrap_err().to_string();
         assert!(error.contains(key), "{error}");
         assert_eq!(simulation.grain_count(), count);

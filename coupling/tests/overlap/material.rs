@@ -304,7 +304,10 @@ fn a_journey_goes_on_from_its_numbers_and_within_its_budget() {
     other.advance(9.0, 1.0);
     assert_eq!(joined.edge.moves(), other.edge.moves());
     assert!(!joined.edge.moves().is_empty());
-    assert_eq!(joined.simulation.state_hash(), other.simulation.state_hash());
+    assert_eq!(
+        joined.simulation.state_hash(),
+        other.simulation.state_hash()
+    );
     let [mut ours, mut theirs] = [Vec::new(), Vec::new()];
     joined.edge.write(&mut ours);
     other.edge.write(&mut theirs);

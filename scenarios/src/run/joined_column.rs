@@ -415,7 +415,6 @@ impl Recipe for JoinedColumn<'_> {
             ("edge_foot", "m"),
             ("edge_top", "m"),
             ("edge_label", "m"),
-            ("grains", "1"),
         ]
         .map(|(name, unit)| (name.to_owned(), unit))
         .to_vec()
@@ -428,7 +427,7 @@ impl Recipe for JoinedColumn<'_> {
             *guard = self.recalled(simulation, state).ok();
         }
         let Some(live) = guard.as_ref() else {
-            return vec![f64::NAN; 7];
+            return vec![f64::NAN; 6];
         };
         let last = live.course.fronts.last();
         let [_, front, height] = last.copied().unwrap_or([f64::NAN; 3]);
@@ -441,7 +440,6 @@ impl Recipe for JoinedColumn<'_> {
             end(places.first()),
             end(places.last()),
             self.scene.edge() + live.edge.travelled(),
-            simulation.grain_count() as f64,
         ]
     }
 

@@ -8,7 +8,7 @@ use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Where there are grains.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ColumnZoneKeys {
     /// Distance over the column's height at which grains begin, from the wall; what is left out is computed.
@@ -24,6 +24,18 @@ pub struct ColumnZoneKeys {
     /// grains again.
     #[serde(default)]
     pub moving: bool,
+    /// Rms speed over √(gravity diameter) below which grains beside a moving edge rest.
+    #[serde(default = "rests")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0))]
+    pub rest_speed_scaled: f64,
+    /// The same above which the continuum behind a moving edge moves; above rest_speed_scaled.
+    #[serde(default = "wakes")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0))]
+    pub wake_speed_scaled: f64,
+    /// Rest over √(height/gravity) after which grains become continuum; every return doubles it.
+    #[serde(default = "holds")]
+    #[schemars(extend("minimum" = 0.0, "maximum" = 1000.0))]
+    pub hold_scaled: f64,
     /// The edge by the oracle instead: a run of the continuum alone comes first, and material that makes more strain
     /// than this under a friction in doubt is grains.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -34,6 +46,33 @@ pub struct ColumnZoneKeys {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 1, "maximum" = 1.0e9))]
     pub budget: Option<u64>,
+}
+
+impl Default for ColumnZoneKeys {
+    fn default() -> Self {
+        Self {
+            edge_scaled: None,
+            rest_scaled: None,
+            moving: false,
+            rest_speed_scaled: rests(),
+            wake_speed_scaled: wakes(),
+            hold_scaled: holds(),
+            tolerance: None,
+            budget: None,
+        }
+    }
+}
+
+fn rests() -> f64 {
+    0.02
+}
+
+fn wakes() -> f64 {
+    0.04
+}
+
+fn holds() -> f64 {
+    0.5
 }
 
 /// The overlap of both, from the edge into the grains. What is left out is computed; `colluvium plan` says it.
@@ -113,11 +152,6 @@ pub const DENSE: f64 = 0.57;
 const FLOWS: f64 = 0.8;
 /// Column heights behind the edge of which the continuum is computed, if nobody says how many.
 const BEHIND: f64 = 1.5;
-/// Speeds over √(g d) below which grains beside a moving edge rest and above which continuum behind it moves, and the
-/// rest over √(H/g) after which they become continuum.
-const RESTS: f64 = 0.01;
-const WAKES: f64 = 0.03;
-const HOLD: f64 = 1.0;
 /// Fewest grains beyond the overlap of an edge that moves.
 const FEWEST_GRAINS: f64 = 50.0;
 /// Fewest diameters of continuum behind the edge, and of grains in front of the overlap.
@@ -151,9 +185,9 @@ impl CollapseScene {
         let unit = (self.gravity * self.grains.diameter).sqrt();
         self.zones.moving.then(|| Travel {
             width: settings.buffer,
-            rest: RESTS * unit,
-            wake: WAKES * unit,
-            hold: HOLD * (self.height / self.gravity).sqrt(),
+            rest: self.zones.rest_speed_scaled * unit,
+            wake: self.zones.wake_speed_scaled * unit,
+            hold: self.zones.hold_scaled * (self.height / self.gravity).sqrt(),
             budget: self.zones.budget.map_or(f64::INFINITY, |most| most as f64),
             fewest: FEWEST_GRAINS,
         })
@@ -240,11 +274,19 @@ impl CollapseScene {
             let range = "left out where zones.tolerance is given: the oracle puts the edge";
             return Err(at("zones").refuse("edge_scaled", edge, range));
         }
+        if zones.wake_speed_scaled <= zones.rest_speed_scaled {
+            let range = format!(
+                "above zones.rest_speed_scaled = {}",
+                zones.rest_speed_scaled
+            );
+            return Err(at("zones").refuse("wake_speed_scaled", zones.wake_speed_scaled, range));
+        }
         if zones.tolerance.is_some() {
             return match zones.rest_scaled {
                 None => Ok(()),
                 Some(rest) => {
-                    let range = "left out where zones.tolerance is given: the oracle says what rests";
+                    let range =
+                        "left out where zones.tolerance is given: the oracle says what rests";
                     Err(at("zones").refuse("rest_scaled", rest, range))
                 }
             };

@@ -20,7 +20,7 @@ const BAND: f64 = 1.0;
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     near: Vec<(GrainSample, f64)>,
-    shell: Vec<Load>,
+    pub(super) shell: Vec<Load>,
     bearers: Vec<usize>,
     forces: Vec<[f64; 2]>,
     loads: Vec<colluvium_dem::Load>,
@@ -46,8 +46,7 @@ impl MaterialEdge {
 
     /// Books the impulses of what was laid over the steps made since.
     fn book_grains(&mut self, simulation: &Simulation) {
-        self.monitors.grain_steps +=
-            simulation.grain_count() as f64 * self.steps_of_loads as f64;
+        self.monitors.grain_steps += simulation.grain_count() as f64 * self.steps_of_loads as f64;
         let time = self.kick + (self.steps_of_loads - 1) as f64 * self.timestep;
         for (sum, force) in self.given.relaxation.iter_mut().zip(&self.laid.relaxation) {
             for (sum, force) in sum.iter_mut().zip(force) {
@@ -95,11 +94,14 @@ impl MaterialEdge {
             if q <= 0.0 {
                 continue;
             }
+            let hats = self.cells.hats(grain.position.x, grain.position.z);
+            let beside = self.view.velocity_at(&hats);
             for (row, hat) in self.cells.rows(grain.position.z) {
+                let [u, w] = beside.unwrap_or(self.held.rows[row].velocity);
                 let load = &mut scratch.shell[row];
                 load.weight += q * hat;
-                load.momentum[0] += q * hat * grain.velocity.x;
-                load.momentum[1] += q * hat * grain.velocity.z;
+                load.slip[0] += q * hat * (grain.velocity.x - u);
+                load.slip[1] += q * hat * (grain.velocity.z - w);
             }
         }
         let full = 0.5 * self.spec.density() * shell * self.cells.spacing * self.spec.slab;
@@ -113,8 +115,8 @@ impl MaterialEdge {
                 continue;
             }
             let load = &scratch.shell[bearer];
-            let mean = load.momentum.map(|p| over(p, load.weight));
-            let impedance = row.impedance(self.spec.settings.impedance, mean);
+            let slip = load.slip.map(|p| over(p, load.weight));
+            let impedance = row.impedance(self.spec.settings.impedance, slip);
             for (axis, (traction, impedance)) in row.traction.iter().zip(impedance).enumerate() {
                 scratch.forces[bearer][axis] += traction + impedance;
                 self.laid.traction[axis] += traction;
@@ -183,14 +185,17 @@ impl MaterialEdge {
     /// Sums of the grains over the cells, stresses taken into their averages with this weight.
     pub(super) fn sum_up(&mut self, weight: f64) {
         self.see_grains();
-        self.sums.press(&self.cells, &self.sighting.snapshot, weight);
+        self.sums
+            .press(&self.cells, &self.sighting.snapshot, weight);
     }
 
     /// Masses, labels and velocities of the grains over the cells.
     pub(super) fn see_grains(&mut self) {
         let (labels, inner) = (&self.labels, self.spec.zones()[1]);
         self.sums
-            .cover(&self.cells, &self.sighting.snapshot, inner, |g| labels.of(g));
+            .cover(&self.cells, &self.sighting.snapshot, inner, |g| {
+                labels.of(g)
+            });
     }
 
     /// Mass of a cell full of continuum (kg).

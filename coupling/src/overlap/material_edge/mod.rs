@@ -23,6 +23,8 @@ mod continuum;
 mod copy;
 mod exchange;
 mod memory;
+#[cfg(test)]
+mod rotation;
 mod rows;
 mod totals;
 mod travel;

@@ -274,12 +274,7 @@ impl MaterialEdge {
     }
 
     /// Books a move, and agrees on what holds after it.
-    fn handed(
-        &mut self,
-        [speed, mass]: [f64; 2],
-        before: [f64; 2],
-        simulation: &mut Simulation,
-    ) {
+    fn handed(&mut self, [speed, mass]: [f64; 2], before: [f64; 2], simulation: &mut Simulation) {
         let now = self.grain_momentum(simulation);
         for axis in 0..2 {
             self.account.handed[axis] += now[axis] - before[axis];

@@ -1,7 +1,7 @@
 //! What the monitors look at after every exchange.
 
-use super::cells::over;
 use super::MaterialEdge;
+use super::cells::over;
 
 /// How far beyond the edge a grain has escaped, in diameters.
 const ESCAPED: f64 = 1.0;

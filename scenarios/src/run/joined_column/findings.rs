@@ -362,13 +362,14 @@ fn sides(
         .heights(free.map(|g| [g.position.x, volume(g.radius)]), base);
     let (xs, heights) = edge.continuum_heights();
     let spacing = edge.cells().spacing;
-    let continuum = places
-        .iter()
-        .map(|x| (x - edge.cells().low) / spacing)
-        .map(|cells| match cells >= 0.0 {
-            true => heights.get(cells as usize).copied().unwrap_or(0.0),
-            false => heights.first().copied().unwrap_or(0.0),
-        });
+    let continuum =
+        places
+            .iter()
+            .map(|x| (x - edge.cells().low) / spacing)
+            .map(|cells| match cells >= 0.0 {
+                true => heights.get(cells as usize).copied().unwrap_or(0.0),
+                false => heights.first().copied().unwrap_or(0.0),
+            });
     let continuum: Vec<f64> = continuum.collect();
     // Height to which the material lies behind the handshake surface over each place.
     let surface = edge.handshake();
