@@ -349,19 +349,13 @@ impl<L: ShearLaw + Clone> Collapse<L> {
 
     /// Fields of the cells with material, x fastest, in SI units.
     pub fn fields(&self) -> Vec<CellFields> {
-        let (units, length) = (&self.units, self.case.height);
         let mut fields = self.flow.cell_fields();
         for f in &mut fields {
-            let scaled = |values: [f64; 2], unit: f64| values.map(|v| v * unit);
-            (f.lower, f.upper) = (scaled(f.lower, length), scaled(f.upper, length));
+            f.scale(self.case.height, &self.units);
             if self.ground.is_some() {
                 f.lower[1] += self.bottom;
                 f.upper[1] += self.bottom;
             }
-            f.velocity = scaled(f.velocity, units.velocity);
-            f.pressure *= units.stress();
-            f.stress = scaled(f.stress, units.stress());
-            f.strain_rate /= units.time();
         }
         fields
     }

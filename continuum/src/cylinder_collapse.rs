@@ -292,7 +292,7 @@ impl CylinderCollapse {
 
     /// Fields of the cells with material, x fastest, in SI units; the axis of the cylinder is at x = y = 0.
     pub fn fields(&self) -> Vec<SpaceFields> {
-        let (units, length) = (&self.units, self.case.height);
+        let length = self.case.height;
         let edge = if self.case.whole {
             self.case.length_scaled * length
         } else {
@@ -300,17 +300,11 @@ impl CylinderCollapse {
         };
         let mut fields = self.flow.cell_fields();
         for f in &mut fields {
+            f.scale(length, &self.units);
             for corner in [&mut f.lower, &mut f.upper] {
-                *corner = [
-                    corner[0] * length - edge,
-                    corner[1] * length - edge,
-                    corner[2] * length,
-                ];
+                corner[0] -= edge;
+                corner[1] -= edge;
             }
-            f.velocity = f.velocity.map(|u| u * units.velocity);
-            f.pressure *= units.stress();
-            f.stress = f.stress.map(|s| s * units.stress());
-            f.strain_rate /= units.time();
         }
         fields
     }

@@ -52,6 +52,7 @@ pub mod grid;
 pub mod heap;
 pub mod layer;
 pub mod linear_solver;
+pub mod open_chute;
 pub mod plane_shear;
 pub mod plane_wave;
 pub mod rheology;

@@ -39,6 +39,12 @@ pub(crate) fn shear_row<const D: usize>(low: usize, high: usize) -> usize {
     if D == 2 { 1 } else { low + high + 1 }
 }
 
+/// τ_xx, τ_yy and τ_zz of a stress in space.
+pub fn deviator(stress: [f64; SPACE_COMPONENTS]) -> [f64; 3] {
+    let level = THIRD_ROOT * stress[1];
+    [level + stress[0], level - stress[0], -2.0 * level]
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -69,6 +75,18 @@ mod tests {
         }
         let tensor = f64::sqrt(2.0 * squares);
         assert!((strain_rate_norm(components(gradient)) / tensor - 1.0).abs() < 1e-15);
+    }
+
+    /// Shears and normal stresses give back |τ|² = ½ τ:τ, and the definitions of the first two components.
+    #[test]
+    fn the_deviator_belongs_to_its_components() {
+        let stress = [0.4, -1.1, 0.3, 0.7, -0.2];
+        let [xx, yy, zz] = deviator(stress);
+        assert!((0.5 * (xx - yy) - stress[0]).abs() < 1e-15 && (xx + yy + zz).abs() < 1e-15);
+        assert!(((xx + yy - 2.0 * zz) / (2.0 * 3.0_f64.sqrt()) - stress[1]).abs() < 1e-15);
+        let shears: f64 = stress[2..].iter().map(|s| s * s).sum();
+        let half = 0.5 * (xx * xx + yy * yy + zz * zz) + shears;
+        assert!((half.sqrt() / strain_rate_norm(stress) - 1.0).abs() < 1e-15);
     }
 
     /// A plane flow has the same γ̇ in whichever plane it lies, and the one of two components.

@@ -5,6 +5,7 @@ mod collapse;
 mod cylinder;
 mod joined_incline;
 mod law;
+mod open_chute;
 mod world;
 
 use crate::calibrate;
@@ -42,6 +43,7 @@ pub fn plan(scene: &Scene) -> Result<String, Failure> {
             Ok(collapse::collapse(body, ground.as_ref()))
         }
         SceneBody::Cylinder(body) => Ok(cylinder::cylinder(body)),
+        SceneBody::OpenChute(body) => open_chute::open_chute(scene, body),
         SceneBody::Impact(body) => impact(scene, body),
         SceneBody::Chute(body) => bed::chute(body),
         SceneBody::Settle(body) => bed::settle(body),

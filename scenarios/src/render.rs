@@ -289,6 +289,16 @@ fn speed(v: &[f64; 3]) -> f64 {
     v.iter().map(|x| x * x).sum::<f64>().sqrt()
 }
 
+/// Corners round the sides of a hexahedron.
+const SIDES: [[usize; 4]; 6] = [
+    [0, 1, 2, 3],
+    [4, 5, 6, 7],
+    [0, 1, 5, 4],
+    [1, 2, 6, 5],
+    [2, 3, 7, 6],
+    [3, 0, 4, 7],
+];
+
 fn instant(frame: &Frame, request: &Request, top: f64) -> Result<Instant, String> {
     let fast = |v: &[f64; 3]| speed_colour(speed(v) / top.max(f64::MIN_POSITIVE));
     let velocity = frame.vectors("velocity")?;
@@ -320,6 +330,16 @@ fn instant(frame: &Frame, request: &Request, top: f64) -> Result<Instant, String
                 let [a, b, c, d] = *corners;
                 let colour = fast(velocity);
                 plates.extend([[a, b, c], [a, c, d]].map(|corners| Plate { corners, colour }));
+            }
+        }
+        Cells::Hexahedra => {
+            let corners: Vec<[f64; 3]> = places.collect();
+            for (corners, velocity) in corners.as_chunks::<8>().0.iter().zip(velocity) {
+                let colour = fast(velocity);
+                for side in SIDES {
+                    let [a, b, c, d] = side.map(|corner| corners[corner]);
+                    plates.extend([[a, b, c], [a, c, d]].map(|corners| Plate { corners, colour }));
+                }
             }
         }
         Cells::Lines => return Err("holds lines, not grains or cells".into()),

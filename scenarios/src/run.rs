@@ -24,10 +24,12 @@ pub mod incline;
 pub mod joined_column;
 pub mod joined_incline;
 mod march_record;
+pub mod open_chute;
 pub mod precheck;
 pub mod settle;
 mod silo;
 pub mod step;
+mod surface_fields;
 mod surface_steps;
 mod tensile;
 mod tumbling_box;
@@ -244,6 +246,7 @@ pub fn check(scene: &Scene) -> Result<(), Failure> {
         SceneBody::Grains(kind) => world::course::check(scene, kind.recipe()),
         SceneBody::Collapse(body) => collapse::check(scene, body),
         SceneBody::Cylinder(body) => cylinder::check(scene, body),
+        SceneBody::OpenChute(body) => open_chute::check(scene, body),
     }
 }
 
@@ -298,6 +301,7 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> {
             SceneBody::Grains(kind) => world::course::run(kind.recipe(), &mut under),
             SceneBody::Collapse(body) => collapse::run(body, &mut under),
             SceneBody::Cylinder(body) => cylinder::run(body, &mut under),
+            SceneBody::OpenChute(body) => open_chute::run(body, &mut under),
         })
     });
     let (begun, wall_s, going_on) = (under.begun, under.wall_s(), under.resumed.is_some());

@@ -29,6 +29,7 @@ mod law;
 mod law_layers;
 mod layer_case;
 pub mod layers;
+mod open_chute;
 mod overlap;
 mod settle;
 mod silo;
@@ -64,6 +65,7 @@ pub use law::{
     CohesionKind, LawKeys, LeverKind, MemoryKind, NormalKind, Parts, RollingKind, TangentialKind,
 };
 pub use layer_case::{LayerCase, LayerVisitor};
+pub use open_chute::{InflowKeys, OpenChuteGrid, OpenChuteScene};
 pub use overlap::{InclineModel, NormalMotionKind, OverlapKeys};
 pub use settle::{SettleFloor, SettleGrains, SettleScene};
 pub use silo::SiloScene;
@@ -75,7 +77,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// The names and texts of the bundled scenes.
-pub const BUNDLED: [(&str, &str); 21] = [
+pub const BUNDLED: [(&str, &str); 22] = [
     ("incline", include_str!("../scenes/incline.toml")),
     (
         "incline-moderate",
@@ -115,6 +117,7 @@ pub const BUNDLED: [(&str, &str); 21] = [
         "cylinder-collapse",
         include_str!("../scenes/cylinder-collapse.toml"),
     ),
+    ("open-chute", include_str!("../scenes/open-chute.toml")),
     ("cliff", include_str!("../scenes/cliff.toml")),
     ("cliff-aswan", include_str!("../scenes/cliff-aswan.toml")),
     ("cliff-plain", include_str!("../scenes/cliff-plain.toml")),
@@ -147,6 +150,8 @@ pub enum SceneBody {
     Collapse(Box<CollapseScene>),
     /// A cylinder of material that collapses, in space.
     Cylinder(Box<CylinderScene>),
+    /// A layer that enters a chute at one end and leaves it at the other.
+    OpenChute(Box<OpenChuteScene>),
 }
 
 impl SceneBody {
@@ -161,6 +166,7 @@ impl SceneBody {
             SceneBody::Grains(kind) => kind.to_table(),
             SceneBody::Collapse(scene) => toml::Table::try_from(scene),
             SceneBody::Cylinder(scene) => toml::Table::try_from(scene),
+            SceneBody::OpenChute(scene) => toml::Table::try_from(scene),
         }
         .unwrap_or_default()
     }
@@ -247,6 +253,7 @@ impl Scene {
             Family::Bagnold | Family::Cylinder => &[],
             Family::Collapse => &law::CHOICES,
             Family::Incline => &INCLINE_CHOICES[..1],
+            Family::OpenChute => &CHUTE_CHOICES[..1],
             _ => choices,
         };
         let impact = matches!(kind, Family::Impact);
@@ -308,7 +315,11 @@ impl Scene {
             law_layers::drop_unread(&mut table, impact);
         }
         let of_incline = matches!(kind, Family::Incline) && table.contains_key("rheology");
-        if of_incline || matches!(kind, Family::Bagnold | Family::Collapse | Family::Cylinder) {
+        let of_continuum = matches!(
+            kind,
+            Family::Bagnold | Family::Collapse | Family::Cylinder | Family::OpenChute
+        );
+        if of_incline || of_continuum {
             // A bundled scene has the numbers of all laws, as defaults.
             if folder.is_some() && !friction_keys::chooses(&set) {
                 friction_keys::check_read(&table, &written, origin)?;
@@ -386,6 +397,7 @@ impl Scene {
             SceneBody::Grains(kind) => kind.check_together(origin),
             SceneBody::Collapse(scene) => scene.check_together(origin),
             SceneBody::Cylinder(scene) => scene.check_together(origin),
+            SceneBody::OpenChute(scene) => scene.check_together(origin),
         }
     }
 }
@@ -436,6 +448,7 @@ fn body(name: &str, table: &toml::Table) -> Result<SceneBody, String> {
         },
         Family::Collapse => SceneBody::Collapse(table.try_into().map_err(plain)?),
         Family::Cylinder => SceneBody::Cylinder(table.try_into().map_err(plain)?),
+        Family::OpenChute => SceneBody::OpenChute(table.try_into().map_err(plain)?),
     })
 }
 
@@ -455,6 +468,7 @@ enum Family {
     Grains,
     Collapse,
     Cylinder,
+    OpenChute,
 }
 
 /// What a scene of this kind builds on. A `grains` scene stands for itself: walls and grains of the
@@ -475,6 +489,7 @@ fn family(name: &str) -> Family {
         _ if Kind::NAMES.contains(&name) => Family::Grains,
         "column-collapse" | "cliff-plain" => Family::Collapse,
         "cylinder-collapse" => Family::Cylinder,
+        "open-chute" => Family::OpenChute,
         _ => Family::Incline,
     }
 }
@@ -485,26 +500,35 @@ fn alternatives(name: &str) -> &'static [&'static [&'static str]] {
         Family::Incline => &INCLINE_CHOICES,
         Family::Bagnold | Family::Cylinder => rheology_file::ALTERNATIVES,
         Family::Collapse => &COLLAPSE_CHOICES,
+        Family::OpenChute => &CHUTE_CHOICES,
         Family::Impact | Family::Grains => &law::CHOICES,
         Family::Chute | Family::Settle => &BED_CHOICES,
     }
 }
 
-/// Alternatives of inclines: the stiffness, and a rheology file or numbers.
-const INCLINE_CHOICES: [&[&str]; 1 + rheology_file::ALTERNATIVES.len()] = {
-    let mut choices: [&[&str]; 1 + rheology_file::ALTERNATIVES.len()] = [&[
-        "contact.stiffness_scaled",
-        "contact.stiffness",
-        "contact.stiffness_from_speed",
-    ];
-        1 + rheology_file::ALTERNATIVES.len()];
+/// One choice and a rheology file or numbers.
+const fn beside_rheology(
+    first: &'static [&'static str],
+) -> [&'static [&'static str]; 1 + rheology_file::ALTERNATIVES.len()] {
+    let mut choices = [first; 1 + rheology_file::ALTERNATIVES.len()];
     let mut k = 0;
     while k < rheology_file::ALTERNATIVES.len() {
         choices[k + 1] = rheology_file::ALTERNATIVES[k];
         k += 1;
     }
     choices
-};
+}
+
+/// Alternatives of inclines: the stiffness, and a rheology file or numbers.
+const INCLINE_CHOICES: [&[&str]; 1 + rheology_file::ALTERNATIVES.len()] = beside_rheology(&[
+    "contact.stiffness_scaled",
+    "contact.stiffness",
+    "contact.stiffness_from_speed",
+]);
+
+/// Alternatives of fed chutes: what enters, and a rheology file or numbers.
+const CHUTE_CHOICES: [&[&str]; 1 + rheology_file::ALTERNATIVES.len()] =
+    beside_rheology(open_chute::INFLOWS);
 
 /// Alternatives of the scenes of a bed: its length, and those of the law.
 const BED_CHOICES: [&[&str]; 4] = [
@@ -541,6 +565,7 @@ fn body_schema(name: &str) -> Value {
         Family::Grains => return Kind::schema(name).unwrap_or_default(),
         Family::Collapse => schemars::schema_for!(CollapseScene),
         Family::Cylinder => schemars::schema_for!(CylinderScene),
+        Family::OpenChute => schemars::schema_for!(OpenChuteScene),
     };
     schema.to_value()
 }

@@ -1,18 +1,20 @@
 //! VTKHDF: grains, contacts and fields through time in files that ParaView opens as they are.
 //!
-//! Layout: group `/VTKHDF` of type `PolyData`, version 2.0, one part a time step; points and cells of all
-//! steps one behind the other, and in `Steps` where each step begins.
+//! Layout: group `/VTKHDF` of type `PolyData`, or `UnstructuredGrid` for cells in space, version 2.0, one part
+//! a time step; points and cells of all steps one behind the other, and in `Steps` where each step begins.
+//! Cells in space share the points that they have in common, so that fields can be carried from cells to
+//! points.
 //! Source: VTK file format documentation, "VTKHDF File Format" (Kitware).
 
 use crate::failure::Failure;
-use crate::results_file::{attribute, put_in_place, reason};
-use hdf5::types::FixedAscii;
-use hdf5::{Dataset, Extent, Group, H5Type};
+use crate::results_file::{put_in_place, reason};
 use std::path::Path;
 
 mod reading;
+mod series;
 
 pub use reading::{read_frame, read_series};
+use series::Series;
 
 /// What the cells of a frame are.
 #[derive(Clone, Copy, Debug, PartialEq, Eq)]
@@ -25,6 +27,9 @@ pub enum Cells {
     Triangles,
     /// Points 4 k to 4 k + 3 go round quadrilateral k.
     Quadrilaterals,
+    /// Points 8 k to 8 k + 3 go round the base of hexahedron k, 8 k + 4 to 8 k + 7 round its top, in the same
+    /// order.
+    Hexahedra,
 }
 
 /// Values of a field.
@@ -64,20 +69,7 @@ pub struct Frame {
     pub fields: Vec<Field>,
 }
 
-/// Kinds of cells in the order of the format.
-const TOPOLOGIES: [&str; 4] = ["Vertices", "Lines", "Polygons", "Strips"];
-/// Values of a chunk of a dataset.
-const CHUNK: usize = 4096;
-
 impl Cells {
-    fn topology(self) -> usize {
-        match self {
-            Cells::Points => 0,
-            Cells::Lines => 1,
-            Cells::Triangles | Cells::Quadrilaterals => 2,
-        }
-    }
-
     /// Points of a cell.
     pub fn points_each(self) -> usize {
         match self {
@@ -85,6 +77,7 @@ impl Cells {
             Cells::Lines => 2,
             Cells::Triangles => 3,
             Cells::Quadrilaterals => 4,
+            Cells::Hexahedra => 8,
         }
     }
 
@@ -92,7 +85,9 @@ impl Cells {
     fn data(self) -> &'static str {
         match self {
             Cells::Points => "PointData",
-            Cells::Lines | Cells::Triangles | Cells::Quadrilaterals => "CellData",
+            Cells::Lines | Cells::Triangles | Cells::Quadrilaterals | Cells::Hexahedra => {
+                "CellData"
+            }
         }
     }
 }
@@ -167,168 +162,78 @@ pub fn write(
     put_in_place(&partial, path).map_err(|error| failed(error.to_string()))
 }
 
-/// A file in the making.
-struct Series {
-    root: Group,
-    cells: Cells,
-    frames: usize,
-}
-
-impl Series {
-    /// Lays the groups of a file whose frames all are like this one.
-    fn begin(root: &Group, like: &Frame) -> hdf5::Result<Series> {
-        root.new_attr::<i64>()
-            .shape(2)
-            .create("Version")?
-            .write_raw(&[2_i64, 0])?;
-        let kind = FixedAscii::<8>::from_ascii("PolyData")
-            .map_err(|error| hdf5::Error::from(error.to_string()))?;
-        root.new_attr::<FixedAscii<8>>()
-            .create("Type")?
-            .write_scalar(&kind)?;
-        let counts = |at: &Group, name: &str| list::<i64>(at, name);
-        counts(root, "NumberOfPoints")?;
-        table::<f64>(root, "Points", 3)?;
-        for topology in TOPOLOGIES {
-            let group = root.create_group(topology)?;
-            for name in [
-                "NumberOfCells",
-                "NumberOfConnectivityIds",
-                "Offsets",
-                "Connectivity",
-            ] {
-                counts(&group, name)?;
-            }
-        }
-        let steps = root.create_group("Steps")?;
-        list::<f64>(&steps, "Values")?;
-        for name in ["PartOffsets", "NumberOfParts", "PointOffsets"] {
-            counts(&steps, name)?;
-        }
-        for name in ["CellOffsets", "ConnectivityIdOffsets"] {
-            table::<i64>(&steps, name, TOPOLOGIES.len())?;
-        }
-        let data = root.create_group(like.cells.data())?;
-        let offsets = steps.create_group(&format!("{}Offsets", like.cells.data()))?;
-        for field in &like.fields {
-            let dataset = match field.values {
-                Values::Scalars(_) => list::<f64>(&data, &field.name)?,
-                Values::Vectors(_) => table::<f64>(&data, &field.name, 3)?,
-                Values::Quaternions(_) => table::<f64>(&data, &field.name, 4)?,
-                Values::Counts(_) => counts(&data, &field.name)?,
-            };
-            attribute(&dataset, "unit", &field.unit)?;
-            counts(&offsets, &field.name)?;
-        }
-        Ok(Series {
-            root: root.clone(),
-            cells: like.cells,
-            frames: 0,
-        })
-    }
-
-    fn append(&mut self, frame: &Frame) -> hdf5::Result<()> {
-        if frame.cells != self.cells {
-            return Err("frames of different cells in one file".into());
-        }
-        let (root, data) = (&self.root, self.cells.data());
-        let steps = root.group("Steps")?;
-        let points = root.dataset("Points")?;
-        let points_before = points.shape()[0] as i64;
-        push(&steps.dataset("Values")?, &[frame.time])?;
-        push(&steps.dataset("PartOffsets")?, &[self.frames as i64])?;
-        push(&steps.dataset("NumberOfParts")?, &[1_i64])?;
-        push(&steps.dataset("PointOffsets")?, &[points_before])?;
-        push(
-            &root.dataset("NumberOfPoints")?,
-            &[frame.points.len() as i64],
-        )?;
-        push_rows(&points, &frame.points)?;
-        let (mut cells_before, mut ids_before) = ([0_i64; 4], [0_i64; 4]);
-        for (k, topology) in TOPOLOGIES.into_iter().enumerate() {
-            let group = root.group(topology)?;
-            let connectivity = group.dataset("Connectivity")?;
-            let offsets = group.dataset("Offsets")?;
-            // One more offset than cells in every frame.
-            cells_before[k] = offsets.shape()[0] as i64 - self.frames as i64;
-            ids_before[k] = connectivity.shape()[0] as i64;
-            let own = k == self.cells.topology();
-            let cells = if own { frame.cell_count() } else { 0 };
-            let each = self.cells.points_each();
-            let ids: Vec<i64> = (0..(cells * each) as i64).collect();
-            let ends: Vec<i64> = (0..=cells).map(|cell| (cell * each) as i64).collect();
-            push(&group.dataset("NumberOfCells")?, &[cells as i64])?;
-            push(
-                &group.dataset("NumberOfConnectivityIds")?,
-                &[ids.len() as i64],
-            )?;
-            push(&offsets, &ends)?;
-            push(&connectivity, &ids)?;
-        }
-        push_rows(&steps.dataset("CellOffsets")?, &[cells_before])?;
-        push_rows(&steps.dataset("ConnectivityIdOffsets")?, &[ids_before])?;
-        let offsets = steps.group(&format!("{data}Offsets"))?;
-        let data = root.group(data)?;
-        for field in &frame.fields {
-            let dataset = data.dataset(&field.name)?;
-            push(&offsets.dataset(&field.name)?, &[dataset.shape()[0] as i64])?;
-            match &field.values {
-                Values::Scalars(values) => push(&dataset, values)?,
-                Values::Vectors(values) => push_rows(&dataset, values)?,
-                Values::Quaternions(values) => push_rows(&dataset, values)?,
-                Values::Counts(values) => push(&dataset, values)?,
-            }
-        }
-        self.frames += 1;
-        Ok(())
-    }
-
-    fn finish(&self) -> hdf5::Result<()> {
-        self.root
-            .group("Steps")?
-            .new_attr::<i64>()
-            .create("NSteps")?
-            .write_scalar(&(self.frames as i64))
-    }
-}
-
-/// An empty list that can grow.
-fn list<T: H5Type>(at: &Group, name: &str) -> hdf5::Result<Dataset> {
-    at.new_dataset::<T>()
-        .chunk(CHUNK)
-        .shuffle()
-        .deflate(1)
-        .shape(Extent::resizable(0))
-        .create(name)
-}
-
-/// An empty table that can grow.
-fn table<T: H5Type>(at: &Group, name: &str, columns: usize) -> hdf5::Result<Dataset> {
-    at.new_dataset::<T>()
-        .chunk((CHUNK, columns))
-        .shuffle()
-        .deflate(1)
-        .shape((Extent::resizable(0), Extent::fixed(columns)))
-        .create(name)
-}
-
-fn push<T: H5Type>(to: &Dataset, values: &[T]) -> hdf5::Result<()> {
-    let from = to.shape()[0];
-    to.resize(from + values.len())?;
-    if values.is_empty() {
-        return Ok(());
-    }
-    to.write_slice::<_, T, _, _>(values, from..from + values.len())
-}
-
-fn push_rows<T: H5Type, const N: usize>(to: &Dataset, rows: &[[T; N]]) -> hdf5::Result<()> {
-    let from = to.shape()[0];
-    to.resize((from + rows.len(), N))?;
-    if rows.is_empty() {
-        return Ok(());
-    }
-    to.write_slice::<_, T, _, _>(rows, (from..from + rows.len(), 0..N))
-}
-
 #[cfg(test)]
-mod tests;
+mod tests {
+    use super::*;
+
+    fn frame(time: f64, points: usize, cells: Cells) -> Frame {
+        let count = points / cells.points_each();
+        let scalars = (0..count).map(|k| time + k as f64).collect();
+        Frame {
+            time,
+            cells,
+            points: (0..points).map(|k| [k as f64, time, -1.0]).collect(),
+            fields: vec![
+                Field {
+                    name: "id".into(),
+                    unit: "1".into(),
+                    values: Values::Counts((0..count as i64).collect()),
+                },
+                Field {
+                    name: "radius".into(),
+                    unit: "m".into(),
+                    values: Values::Scalars(scalars),
+                },
+                Field {
+                    name: "velocity".into(),
+                    unit: "m/s".into(),
+                    values: Values::Vectors(vec![[time, 2.0, 3.0]; count]),
+                },
+            ],
+        }
+    }
+
+    #[test]
+    fn a_frame_reads_back() {
+        let folder = tempfile::tempdir().unwrap();
+        for (cells, points) in [
+            (Cells::Points, 8),
+            (Cells::Lines, 8),
+            (Cells::Lines, 0),
+            (Cells::Hexahedra, 16),
+            (Cells::Hexahedra, 0),
+        ] {
+            let path = folder.path().join("frame.vtkhdf");
+            write(&path, [Ok(frame(0.5, points, cells))]).unwrap();
+            assert_eq!(read_frame(&path).unwrap(), frame(0.5, points, cells));
+        }
+    }
+
+    #[test]
+    fn a_failing_frame_leaves_the_file_before() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("grains.vtkhdf");
+        write(&path, [Ok(frame(0.5, 8, Cells::Points))]).unwrap();
+        let lost = Err(Failure::Run("lost".into()));
+        let error = write(&path, [Ok(frame(1.0, 4, Cells::Points)), lost]).unwrap_err();
+        assert!(error.to_string().contains("lost"), "{error}");
+        assert_eq!(read_frame(&path).unwrap().time, 0.5);
+        assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 1);
+    }
+
+    #[test]
+    fn a_series_is_not_a_frame_and_neither_is_rubbish() {
+        let folder = tempfile::tempdir().unwrap();
+        let path = folder.path().join("grains.vtkhdf");
+        let both = [0.0, 1.0].map(|t| Ok(frame(t, 6, Cells::Points)));
+        write(&path, both).unwrap();
+        assert!(
+            read_frame(&path)
+                .unwrap_err()
+                .to_string()
+                .contains("2 steps")
+        );
+        std::fs::write(&path, "rubbish").unwrap();
+        assert!(read_frame(&path).is_err());
+    }
+}

@@ -122,6 +122,8 @@ fn a_stored_bed_of_clumps_is_the_one_that_was_made() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     std::fs::write(at("bed.toml"), poured()).unwrap();
+    let plan = succeed(folder.path(), &["plan", "bed.toml"]);
+    assert!(plan.contains("30 clumps jack of 4 balls poured"), "{plan}");
     succeed(folder.path(), &["run", "bed.toml", "--out", "made"]);
     let kept = std::fs::read(at("packings/jacks.h5")).unwrap();
     let plan = succeed(folder.path(), &["plan", "bed.toml"]);

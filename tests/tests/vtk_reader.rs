@@ -6,7 +6,11 @@
 #![allow(clippy::unwrap_used)]
 
 use colluvium::frames;
+use colluvium::run::cylinder;
 use colluvium::vtkhdf;
+use colluvium_continuum::cylinder_collapse::{CylinderCase, CylinderCollapse};
+use colluvium_continuum::free_surface::SurfaceOptions;
+use colluvium_continuum::rheology::MuI;
 use colluvium_dem::{
     Body, Clump, ContactLaw, Domain, Grain, Hooke, Part, Pose, Setup, Simulation, Snapshot,
     TangentialSpring, Threads, Wall,
@@ -30,13 +34,40 @@ for step in range(steps):
     reader.Update()
     data = reader.GetOutput()
     points = vtk_to_numpy(data.GetPoints().GetData()).sum()
-    corners = sum(of.GetNumberOfConnectivityIds() for of in (data.GetVerts(), data.GetLines(), data.GetPolys()))
+    surfaces = hasattr(data, "GetPolys")
+    kinds = (data.GetVerts(), data.GetLines(), data.GetPolys()) if surfaces else (data.GetCells(),)
+    corners = sum(of.GetNumberOfConnectivityIds() for of in kinds)
     print("step", reader.GetTimeValue(), data.GetNumberOfPoints(), data.GetNumberOfCells(), corners, repr(float(points)))
     for of in (data.GetPointData(), data.GetCellData()):
         for k in range(of.GetNumberOfArrays()):
             array = of.GetArray(k)
             numbers = vtk_to_numpy(array)
             print(array.GetName(), *(numbers.shape + (1,))[:2], repr(float(numbers.sum())))
+"#;
+
+/// Prints, for every step of a series, the volume of all cells as VTK computes it, and the mean of the field
+/// `pressure` that VTK carries from cells to the points they share.
+const MEASURER: &str = r#"
+import sys
+from vtkmodules.vtkIOHDF import vtkHDFReader
+from vtkmodules.vtkFiltersVerdict import vtkCellSizeFilter
+from vtkmodules.vtkFiltersCore import vtkCellDataToPointData
+from vtkmodules.util.numpy_support import vtk_to_numpy
+reader = vtkHDFReader()
+reader.SetFileName(sys.argv[1])
+reader.UpdateInformation()
+for step in range(reader.GetNumberOfSteps()):
+    reader.SetStep(step)
+    reader.Update()
+    sizes = vtkCellSizeFilter()
+    sizes.SetInputData(reader.GetOutput())
+    sizes.Update()
+    points = vtkCellDataToPointData()
+    points.SetInputData(reader.GetOutput())
+    points.Update()
+    volumes = vtk_to_numpy(sizes.GetOutput().GetCellData().GetArray("Volume"))
+    pressure = vtk_to_numpy(points.GetOutput().GetPointData().GetArray("pressure"))
+    print(repr(float(volumes.min())), repr(float(volumes.sum())), repr(float(pressure.mean())))
 "#;
 
 fn has_vtk(python: &Path) -> bool {
@@ -144,19 +175,24 @@ fn check(python: &Path, path: &Path, frames: &[vtkhdf::Frame]) {
             .split(' ')
             .map(|x| x.parse().unwrap())
             .collect();
-        let points_each = match frame.cells {
-            vtkhdf::Cells::Points => 1,
-            vtkhdf::Cells::Lines => 2,
-            vtkhdf::Cells::Triangles => 3,
-            vtkhdf::Cells::Quadrilaterals => 4,
-        };
-        let points = frame.points.len();
-        let cells = points / points_each;
-        let sum: f64 = frame.points.iter().flatten().sum();
+        let cells = frame.points.len() / frame.cells.points_each();
+        let corners = frame.points.len();
+        let mut points = frame.points.clone();
+        if frame.cells == vtkhdf::Cells::Hexahedra {
+            // They share their corners.
+            points.sort_by(|a, b| a.partial_cmp(b).unwrap());
+            points.dedup();
+        }
+        let sum: f64 = points.iter().flatten().sum();
         let close = |a: f64, b: f64| (a - b).abs() <= 1e-9 * (1.0 + b.abs());
         assert_eq!(
             head[..4],
-            [frame.time, points as f64, cells as f64, points as f64]
+            [
+                frame.time,
+                points.len() as f64,
+                cells as f64,
+                corners as f64
+            ]
         );
         assert!(close(head[4], sum), "points: {} against {sum}", head[4]);
         let read: Vec<Vec<&str>> = lines.map(|line| line.split(' ').collect()).collect();
@@ -368,6 +404,80 @@ fn vtk_reads_quadrilaterals_through_time() {
         Some(python) => check(&python, &path, &frames),
         None => eprintln!("no Python with VTK here, and none could be installed"),
     }
+}
+
+/// The cylinder in space that the scene writes: hexahedra that share their corners, as many as hold material at
+/// each instant. VTK finds their volume, and carries fields over to the corners.
+#[test]
+fn vtk_reads_hexahedra_through_time() {
+    let _alone = ONE_AT_A_TIME.lock();
+    let folder = tempfile::tempdir().unwrap();
+    let case = CylinderCase {
+        aspect: 1.0,
+        height: 0.1,
+        gravity: 9.81,
+        rheology: MuI::new(0.382, 0.643, 0.279, 0.002, 0.6, 2500.0),
+        cells: 9,
+        length_scaled: 2.9,
+        whole: false,
+    };
+    let mut collapse = CylinderCollapse::new(&case, &SurfaceOptions::default()).unwrap();
+    let frames: Vec<vtkhdf::Frame> = (0..3)
+        .map(|nth| {
+            for _ in 0..4 * nth {
+                collapse.step(1.0).unwrap();
+            }
+            cylinder::frame(&collapse)
+        })
+        .collect();
+    assert_ne!(frames[0].points.len(), frames[2].points.len());
+    let path = folder.path().join("fields.vtkhdf");
+    vtkhdf::write(&path, frames.iter().cloned().map(Ok)).unwrap();
+    assert_eq!(vtkhdf::read_series(&path).unwrap(), sorted(&frames));
+    let Some(python) = python() else {
+        eprintln!("no Python with VTK here, and none could be installed");
+        return;
+    };
+    check(&python, &path, &frames);
+    let out = Command::new(python)
+        .args(["-c", MEASURER])
+        .arg(&path)
+        .output()
+        .unwrap();
+    let text = String::from_utf8_lossy(&out.stdout);
+    assert_eq!(
+        text.lines().count(),
+        3,
+        "{}",
+        String::from_utf8_lossy(&out.stderr)
+    );
+    let volume = f64::powi(0.1 * 2.9 / 9.0, 3);
+    for (line, frame) in text.lines().zip(&frames) {
+        let found: Vec<f64> = line.split(' ').map(|x| x.parse().unwrap()).collect();
+        let whole = (frame.points.len() / 8) as f64 * volume;
+        assert!((found[0] / volume - 1.0).abs() < 1e-9, "{line}");
+        assert!((found[1] / whole - 1.0).abs() < 1e-9, "{line} {whole}");
+        // The mean over corners weighs cells by how many others share theirs; it lies between the extremes.
+        let pressure = frame.scalars("pressure").unwrap();
+        let most = pressure.iter().fold(0.0_f64, |most, p| most.max(*p));
+        assert!((0.0..=most).contains(&found[2]), "{line}");
+    }
+    // At the end of the fall the base carries what stands on it.
+    let last = frames[2].scalars("pressure").unwrap();
+    let most = last.iter().fold(0.0_f64, |most, p| most.max(*p));
+    assert!(
+        most > 100.0 && most < 2.0 * 1500.0 * 9.81 * 0.1,
+        "{most} Pa"
+    );
+}
+
+/// Frames with their fields in the order in which files list them.
+fn sorted(frames: &[vtkhdf::Frame]) -> Vec<vtkhdf::Frame> {
+    let mut sorted = frames.to_vec();
+    for frame in &mut sorted {
+        frame.fields.sort_by(|a, b| a.name.cmp(&b.name));
+    }
+    sorted
 }
 
 #[test]

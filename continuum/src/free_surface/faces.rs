@@ -51,7 +51,7 @@ impl Face {
 }
 
 /// Directions whose merits differ by less than this part are alike.
-pub(super) const ALIKE: f64 = 1e-6;
+pub(super) const ALIKE: f64 = 1e-4;
 /// Cells fuller than this are active.
 pub(crate) const ACTIVE: f64 = 0.5;
 /// Layers thinner than this part of a cell stick to a rough wall.
@@ -167,7 +167,9 @@ impl<const D: usize> Faces<D> {
             if at == NONE {
                 0.0
             } else {
-                topology.face_mean(component, at, fractions)
+                let mass = topology.face_mean(component, at, fractions);
+                // In space dust lies here or there as round-off has it.
+                if D > 2 && mass < EMPTY { 0.0 } else { mass }
             }
         };
         let mut directions: [(f64, usize, usize); D] = std::array::from_fn(|axis| {
@@ -256,6 +258,12 @@ impl<const D: usize> Faces<D> {
                     return host;
                 }
             }
+        }
+        // Towards the material along all axes at once: on the diagonal of what mirrors itself this is on it, too.
+        let sloping = (0..D).filter(|&n| !level(n));
+        let corner = sloping.fold(face, |at, n| step(at, directions[n].1, directions[n].2));
+        if let Some(host) = self.own_at(component, corner) {
+            return Some(host);
         }
         for group in (0..D).filter(|&n| rank[n] == n && !level(n)) {
             let host = single(&mut (0..D).filter(|&n| rank[n] == group).map(against));

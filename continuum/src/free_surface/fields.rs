@@ -7,6 +7,7 @@ use crate::discretisation::COMPONENTS;
 use crate::grid::{Axis, Boundary, DIMENSIONS, unflatten};
 use crate::rheology::{Rheology, strain_rate_norm};
 use crate::strain::{shear_row, stretching};
+use crate::units::Units;
 
 /// Matter is rigid where it shears no faster than so many times the strain-rate floor ε.
 const RIGID: f64 = 10.0;
@@ -35,6 +36,19 @@ pub struct CellFields<const D: usize = DIMENSIONS, const C: usize = COMPONENTS> 
     pub flows: bool,
     /// Whether the equations of motion are well posed here; true where nothing flows.
     pub well_posed: bool,
+}
+
+impl<const D: usize, const C: usize> CellFields<D, C> {
+    /// From natural to SI units, of which the length (m) is given beside the others.
+    pub(crate) fn scale(&mut self, length: f64, units: &Units) {
+        for corner in [&mut self.lower, &mut self.upper] {
+            *corner = corner.map(|x| x * length);
+        }
+        self.velocity = self.velocity.map(|u| u * units.velocity);
+        self.pressure *= units.stress();
+        self.stress = self.stress.map(|s| s * units.stress());
+        self.strain_rate /= units.time();
+    }
 }
 
 impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R, D, C, V> {

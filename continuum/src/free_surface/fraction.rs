@@ -19,7 +19,7 @@ const REACH: usize = 3;
 const LEVEL: f64 = 0.3;
 /// Planes whose misses differ by less than this part, or by the round-off of exact ones, are averaged in
 /// space: what mirrors itself has mirrored candidates of equal merit.
-const ALIKE: f64 = 1e-6;
+const ALIKE: f64 = 1e-4;
 /// Cells in space with less material are level: dust has no shape.
 const SHAPELESS: f64 = 1e-10;
 /// The square of round-off.
@@ -113,7 +113,7 @@ impl<'a, const D: usize> Neighbourhood<'a, D> {
                 let done = if side == inner {
                     self.all[at] >= FULL
                 } else {
-                    self.all[at] <= 0.0
+                    self.all[at] <= SHAPELESS
                 };
                 let next = self.topology.cell_neighbours[at][axis][side];
                 if done || next == NONE {
@@ -160,8 +160,7 @@ fn plane_in<const D: usize>(topology: &Topology<D>, fractions: &[f64], cell: usi
     }
     let around = Neighbourhood::around(topology, fractions, cell);
     let mut least = f64::INFINITY;
-    // Sum of the normals of planes as good as the best, and their number.
-    let (mut sum, mut count) = ([0.0; 3], 0);
+    let mut candidates = Candidates::default();
     let middle = (stencil(D) - 1) / 2;
     let excesses: [f64; D] = std::array::from_fn(|axis| around.excess(axis));
     let largest = excesses.iter().fold(0.0_f64, |m, e| m.max(e.abs()));
@@ -193,15 +192,8 @@ fn plane_in<const D: usize>(topology: &Topology<D>, fractions: &[f64], cell: usi
             let plane = Plane::of_fraction(normal, fractions[cell]);
             let margin = if D > 2 { ALIKE * least + EXACT } else { 0.0 };
             let miss = around.miss(&plane, least + margin);
-            if D > 2 && (miss - least).abs() <= margin {
-                count += 1;
-            } else if miss < least {
-                (sum, count) = ([0.0; 3], 1);
-            } else {
-                continue;
-            }
-            for (sum, n) in sum.iter_mut().zip(plane.normal) {
-                *sum += n;
+            if D > 2 && miss <= least + margin {
+                candidates.add(plane.normal, miss);
             }
             if miss < least {
                 least = miss;
@@ -209,10 +201,41 @@ fn plane_in<const D: usize>(topology: &Topology<D>, fractions: &[f64], cell: usi
             }
         }
     }
-    if count > 1 && sum.iter().any(|n| *n != 0.0) {
-        best = Plane::of_fraction(sum, fractions[cell]);
+    match candidates.mean_of_best() {
+        Some(normal) => Plane::of_fraction(normal, fractions[cell]),
+        None => best,
     }
-    best
+}
+
+/// Planes in space that were the best, or as good, when they were tried: their normals and misses.
+#[derive(Default)]
+struct Candidates {
+    all: [([f64; 3], f64); STENCIL],
+    count: usize,
+}
+
+impl Candidates {
+    fn add(&mut self, normal: [f64; 3], miss: f64) {
+        if let Some(slot) = self.all.get_mut(self.count) {
+            *slot = (normal, miss);
+            self.count += 1;
+        }
+    }
+
+    /// Sum of the normals of those as good as the best of all, in whatever order they came, if there are
+    /// several.
+    fn mean_of_best(&self) -> Option<[f64; 3]> {
+        let all = &self.all[..self.count];
+        let least = all.iter().fold(f64::INFINITY, |least, c| least.min(c.1));
+        let (mut sum, mut count) = ([0.0; 3], 0);
+        for (normal, _) in all.iter().filter(|c| c.1 - least <= ALIKE * least + EXACT) {
+            count += 1;
+            for (sum, n) in sum.iter_mut().zip(normal) {
+                *sum += n;
+            }
+        }
+        (count > 1 && sum.iter().any(|n| *n != 0.0)).then_some(sum)
+    }
 }
 
 /// Planes in all partly filled cells; none in the others.

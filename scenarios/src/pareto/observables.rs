@@ -44,6 +44,10 @@ pub fn errors(scene: &Scene, run: &Path, reference: &Path) -> Result<Errors, Fai
         SceneBody::Cylinder(_) => {
             vec![("front".to_owned(), result(run, reference, "runout_scaled")?)]
         }
+        SceneBody::OpenChute(_) => vec![
+            ("velocity".to_owned(), curve(run, reference, SPEEDS)),
+            ("depth".to_owned(), result(run, reference, "depth_at_end")?),
+        ],
         SceneBody::Incline(ref body) if body.rheology.is_some() => [
             ("velocity", "u"),
             ("normal_stress", "sigma_zz"),
@@ -116,6 +120,9 @@ pub fn against_reference(scene: &Scene) -> String {
         SceneBody::Cylinder(_) => {
             "the reference run; relative error of the run-out".to_owned()
         }
+        SceneBody::OpenChute(_) => {
+            "the reference run; the larger of the relative L2 error of the speeds half way down and the relative error of the depth at the open end".to_owned()
+        }
         SceneBody::Incline(body) if body.rheology.is_some() => {
             "the reference run; largest relative L2 error through the depth of velocity, normal and shear stress".to_owned()
         }
@@ -127,6 +134,7 @@ pub fn against_reference(scene: &Scene) -> String {
 type Curve = [&'static str; 3];
 
 const ENERGY: Curve = ["energy.csv", "t", "kinetic_energy"];
+const SPEEDS: Curve = ["speeds.csv", "z", "u"];
 const DEPOSIT: Curve = ["deposit.csv", "x", "h"];
 const PROFILE: Curve = ["profile.csv", "z", "u"];
 

@@ -2,6 +2,7 @@
 
 mod collapse;
 mod joined_incline;
+mod open_chute;
 
 use super::Record;
 use super::page::{figure, number};
@@ -16,7 +17,9 @@ const HEIGHT: u32 = 400;
 pub fn plots(record: &Record) -> Markup {
     html! {
         @if let Some(table) = record.table("pareto") { (pareto(&table)) }
-        @if let Some(table) = record.table("profiles") {
+        @if let (Some(profiles), Some(speeds)) = (record.table("profiles"), record.table("speeds")) {
+            (open_chute::open_chute(&profiles, &speeds, record.table("balance").as_ref()))
+        } @else if let Some(table) = record.table("profiles") {
             (collapse::collapse(&table, record.table("front").as_ref()))
         }
         @if let Some(table) = record.table("trajectory") { (trajectory(&table)) }

@@ -2,7 +2,8 @@
 //!
 //! A bed on a rough base of its own grains, periodic along and across, is set in gentle shear on a slope
 //! that is then held. Below some angle the avalanche rests, above it it goes on: that angle is sought by
-//! halving, with the same bed. The slope has no ends: boxes with walls that are tilted until they run, and
+//! halving, each time with the bed as it was prepared: one that an avalanche has rested in before is
+//! stronger, by 2° at β = 0.2. The slope has no ends: boxes with walls that are tilted until they run, and
 //! heaps that drain over the edges of their base, stand up to ten degrees steeper with two thousand grains,
 //! because walls carry the toe and layers are thin where they end.
 //!
@@ -18,7 +19,7 @@ use crate::scene::{AngleOfReposeScene, LawKeys, layers};
 use crate::summary::{Figure, Quantity, Summary};
 use crate::table::Table;
 use colluvium_dem::preparation::{InclineBed, Packing, settle_incline_bed};
-use colluvium_dem::{ContactLaw, Rolling, SetupError, Simulation, Snapshot, Tangential};
+use colluvium_dem::{ContactLaw, Grain, Rolling, SetupError, Simulation, Snapshot, Tangential};
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
 
@@ -65,6 +66,9 @@ fn published(law: &ContactLaw) -> Option<f64> {
         .map(|[.., angle]| *angle)
 }
 
+/// Numbers of a grain of the bed in the recipe's memory: its place and its radius (m).
+const GRAIN: usize = 4;
+
 /// Numbers of a trial in the recipe's memory: slope (degrees), whether it rested, its last velocity over the
 /// first, and how long it was watched (s).
 const TRIAL: usize = 4;
@@ -79,26 +83,31 @@ struct Search {
     /// Mean velocity that it was given (m/s).
     given: f64,
     trials: Vec<[f64; TRIAL]>,
+    /// The free grains of the bed as it was prepared.
+    bed: Vec<[f64; GRAIN]>,
 }
 
 impl Search {
     fn read(state: &[f64]) -> Option<Search> {
-        let (head, trials) = state.split_first_chunk::<4>()?;
-        let &[low, high, since, given] = head;
-        let trials = trials.as_chunks::<TRIAL>().0.to_vec();
+        let (head, rest) = state.split_first_chunk::<5>()?;
+        let &[low, high, since, given, trials] = head;
+        let (trials, bed) = rest.split_at_checked(TRIAL * trials as usize)?;
         Some(Search {
             low,
             high,
             since,
             given,
-            trials,
+            trials: trials.as_chunks::<TRIAL>().0.to_vec(),
+            bed: bed.as_chunks::<GRAIN>().0.to_vec(),
         })
     }
 
     fn write(&self, state: &mut Vec<f64>) {
         state.clear();
-        state.extend([self.low, self.high, self.since, self.given]);
+        let trials = self.trials.len() as f64;
+        state.extend([self.low, self.high, self.since, self.given, trials]);
         state.extend(self.trials.iter().flatten());
+        state.extend(self.bed.iter().flatten());
     }
 
     fn slope(&self) -> f64 {
@@ -149,6 +158,21 @@ impl AngleOfReposeScene {
 
     fn shear(&self, unit: f64) -> f64 {
         self.search.shear_scaled / unit
+    }
+
+    /// Puts the bed back as it was prepared.
+    fn lay(&self, bed: &[[f64; GRAIN]], simulation: &mut Simulation) -> Result<(), Failure> {
+        let first = self.grains.values().next();
+        let density = first.map_or(f64::NAN, |keys| keys.density);
+        let grains: Vec<Grain> = bed
+            .iter()
+            .map(|&[x, y, z, radius]| Grain::at_rest(Vector3::new(x, y, z), radius, density))
+            .collect();
+        simulation.remove(|grain| !grain.fixed);
+        simulation
+            .insert(&grains)
+            .map(drop)
+            .map_err(|error| Failure::Run(error.to_string()))
     }
 
     /// Sets the bed moving on the slope that is to be tried next.
@@ -326,12 +350,16 @@ impl Recipe for AngleOfReposeScene {
             return Ok(Course::Over);
         };
         let Some(mut search) = Search::read(state) else {
+            let free = simulation.grain_list().into_iter().filter(|g| !g.fixed);
             let mut search = Search {
                 low: self.search.low,
                 high: self.search.high,
                 since: 0.0,
                 given: 0.0,
                 trials: Vec::new(),
+                bed: free
+                    .map(|g| [g.position.x, g.position.y, g.position.z, g.radius])
+                    .collect(),
             };
             self.begin(&mut search, simulation, unit);
             search.write(state);
@@ -349,6 +377,7 @@ impl Recipe for AngleOfReposeScene {
         search.judge(velocity, watched);
         let over = search.high - search.low <= self.search.resolution;
         if !over {
+            self.lay(&search.bed, simulation)?;
             self.begin(&mut search, simulation, unit);
         }
         search.write(state);
@@ -432,6 +461,7 @@ mod tests {
             since: 1.5,
             given: 0.2,
             trials: Vec::new(),
+            bed: vec![[1.0, 2.0, 3.0, 0.5], [-1.0, 0.0, 4.0, 0.4]],
         };
         search.judge(0.001, 3.0);
         search.judge(0.3, 4.0);

@@ -3,6 +3,7 @@
 mod beside_continuum;
 
 use super::bagnold::failure;
+use super::surface_fields::{SurfaceFields, field};
 use super::surface_steps::{FRONTS, PROFILES, Steps, columns, join_pictures, put_state, state_of};
 use super::{Findings, Under, collapse_ground, joined_column, world};
 use crate::cost::Cost;
@@ -15,12 +16,10 @@ use crate::scene::{
 use crate::state_hash;
 use crate::summary::{Model, Quantity, Summary};
 use crate::table::Table;
-use crate::vtkhdf::{Cells, Field, Frame, Values};
+use crate::vtkhdf::{Cells, Frame, Values};
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase, Front};
-use colluvium_continuum::free_surface::{
-    CellFields, SurfaceOptions, SurfaceState, SurfaceStep, ThinLayer,
-};
-use colluvium_continuum::rheology::{ShearLaw, strain_rate_norm};
+use colluvium_continuum::free_surface::{SurfaceOptions, SurfaceState, SurfaceStep, ThinLayer};
+use colluvium_continuum::rheology::ShearLaw;
 use colluvium_continuum::wall_friction::{SideWalls, WallFriction};
 use colluvium_dem::Record;
 
@@ -331,55 +330,18 @@ fn picture<L: ShearLaw + Clone>(
 fn fields<L: ShearLaw + Clone>(scene: &CollapseScene, collapse: &Collapse<L>) -> Frame {
     let cells = collapse.fields();
     let grains = &scene.rheology;
-    // I = γ̇ d √(ρ_s/p), whatever the law.
-    let scale = grains.diameter * grains.grain_density.sqrt();
     let outline = collapse.ground_outline();
-    let corners = cells.iter().map(|c| {
-        let ([x0, z0], [x1, z1]) = (c.lower, c.upper);
-        [[x0, z0], [x1, z0], [x1, z1], [x0, z1]]
-    });
-    let corners = corners.chain(outline.iter().copied()).flatten();
-    let inertial = |c: &CellFields| match c.pressure {
-        p if p > 0.0 => c.strain_rate * scale / p.sqrt(),
-        _ => 0.0,
+    let fields = SurfaceFields {
+        cells: &cells,
+        inertia: grains.diameter * grains.grain_density.sqrt(),
+        others: outline.len(),
     };
-    let friction = |c: &CellFields| match c.pressure {
-        p if p > 0.0 => strain_rate_norm(c.stress) / p,
-        _ => 0.0,
-    };
-    let field = |name: &str, unit: &str, values: Values| Field {
-        name: name.into(),
-        unit: unit.into(),
-        values,
-    };
-    let scalars = |name: &str, unit: &str, of: &dyn Fn(&CellFields) -> f64| {
-        let nothing = std::iter::repeat_n(0.0, outline.len());
-        let values = cells.iter().map(of).chain(nothing);
-        field(name, unit, Values::Scalars(values.collect()))
-    };
-    let flags = |name: &str, of: &dyn Fn(&CellFields) -> bool| {
-        let nothing = std::iter::repeat_n(0, outline.len());
-        let values = cells.iter().map(|c| i64::from(of(c))).chain(nothing);
-        field(name, "1", Values::Counts(values.collect()))
-    };
-    let velocity = cells.iter().map(|c| [c.velocity[0], 0.0, c.velocity[1]]);
-    let velocity = velocity.chain(std::iter::repeat_n([0.0; 3], outline.len()));
+    let ground = outline.iter().flatten().map(|&[x, z]| [x, 0.0, z]);
     let mut frame = Frame {
         time: collapse.time(),
         cells: Cells::Quadrilaterals,
-        points: corners.map(|[x, z]| [x, 0.0, z]).collect(),
-        fields: vec![
-            scalars("fraction", "1", &|c| c.fraction),
-            field("velocity", "m/s", Values::Vectors(velocity.collect())),
-            scalars("pressure", "Pa", &|c| c.pressure),
-            scalars("deviatoric_stress_xx", "Pa", &|c| c.stress[0]),
-            scalars("shear_stress_xz", "Pa", &|c| c.stress[1]),
-            scalars("strain_rate", "1/s", &|c| c.strain_rate),
-            scalars("inertial_number", "1", &inertial),
-            scalars("friction", "1", &friction),
-            flags("flows", &|c| c.flows),
-            flags("well_posed", &|c| c.well_posed),
-        ],
+        points: fields.quadrilaterals().chain(ground).collect(),
+        fields: fields.of_plane(),
     };
     if !outline.is_empty() {
         let material = std::iter::repeat_n(0, cells.len());

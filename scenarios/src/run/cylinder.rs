@@ -2,6 +2,7 @@
 
 use super::bagnold::failure;
 use super::collapse::options_of;
+use super::surface_fields::SurfaceFields;
 use super::surface_steps::{FRONTS, PROFILES, Steps, columns, join_pictures, put_state, state_of};
 use super::{Findings, Under};
 use crate::cost::Cost;
@@ -12,10 +13,10 @@ use crate::scene::{CylinderScene, Scene};
 use crate::state_hash;
 use crate::summary::{Model, Quantity, Summary};
 use crate::table::Table;
-use crate::vtkhdf::{Cells, Field, Frame, Values};
+use crate::vtkhdf::{Cells, Frame};
 use colluvium_continuum::cylinder_collapse::{CylinderCase, CylinderCollapse, CylinderFront};
 use colluvium_continuum::free_surface::{SpaceFields, SpaceState};
-use colluvium_continuum::rheology::strain_rate_norm;
+use colluvium_continuum::strain::deviator;
 use colluvium_dem::Record;
 
 /// What the continuum leaves out.
@@ -169,51 +170,43 @@ pub(super) fn run(scene: &CylinderScene, under: &mut Under) -> Result<Findings, 
     })
 }
 
-/// Writes the fields at an instant of the front: the cells with material, as points at their centres.
+/// Writes the fields at an instant of the front.
 fn picture(under: &Under, collapse: &CylinderCollapse, instant: u64) -> Result<(), Failure> {
+    let frame = frame(collapse);
+    frames::put(under.directory.path(), frames::FIELDS, instant, frame)
+}
+
+/// The cells with material as hexahedra, with the fields over them. The deviatoric stress, positive in tension,
+/// has τ_zz = −τ_xx − τ_yy.
+pub fn frame(collapse: &CylinderCollapse) -> Frame {
     let cells = collapse.fields();
     let law = collapse.rheology();
-    let scalars = |name: &str, unit: &str, values: Vec<f64>| Field {
-        name: name.into(),
-        unit: unit.into(),
-        values: Values::Scalars(values),
+    let fields = SurfaceFields {
+        cells: &cells,
+        inertia: law.diameter * law.grain_density.sqrt(),
+        others: 0,
     };
-    let under_pressure = |p: f64, value: f64| if p > 0.0 { value } else { 0.0 };
-    let inertial = cells
-        .iter()
-        .map(|c| under_pressure(c.pressure, law.inertial_number(c.strain_rate, c.pressure)));
-    let friction = cells
-        .iter()
-        .map(|c| under_pressure(c.pressure, strain_rate_norm(c.stress) / c.pressure));
-    let all = |of: &dyn Fn(&SpaceFields) -> f64| cells.iter().map(of).collect::<Vec<f64>>();
-    let centre = |axis: usize, c: &colluvium_continuum::free_surface::SpaceFields| {
-        0.5 * (c.lower[axis] + c.upper[axis])
-    };
-    let frame = Frame {
+    let stresses = vec![
+        fields.scalars("deviatoric_stress_xx", "Pa", &|c| deviator(c.stress)[0]),
+        fields.scalars("deviatoric_stress_yy", "Pa", &|c| deviator(c.stress)[1]),
+        fields.scalars("shear_stress_xy", "Pa", &|c| c.stress[2]),
+        fields.scalars("shear_stress_xz", "Pa", &|c| c.stress[3]),
+        fields.scalars("shear_stress_yz", "Pa", &|c| c.stress[4]),
+    ];
+    Frame {
         time: collapse.time(),
-        cells: Cells::Points,
-        points: cells
-            .iter()
-            .map(|c| [centre(0, c), centre(1, c), centre(2, c)])
-            .collect(),
-        fields: vec![
-            scalars("cell_size", "m", all(&|c| c.upper[0] - c.lower[0])),
-            scalars("fraction", "1", all(&|c| c.fraction)),
-            Field {
-                name: "velocity".into(),
-                unit: "m/s".into(),
-                values: Values::Vectors(cells.iter().map(|c| c.velocity).collect()),
-            },
-            scalars("pressure", "Pa", all(&|c| c.pressure)),
-            scalars("shear_stress", "Pa", all(&|c| strain_rate_norm(c.stress))),
-            scalars("strain_rate", "1/s", all(&|c| c.strain_rate)),
-            scalars("inertial_number", "1", inertial.collect()),
-            scalars("friction", "1", friction.collect()),
-            scalars("flows", "1", all(&|c| f64::from(c.flows))),
-            scalars("well_posed", "1", all(&|c| f64::from(c.well_posed))),
-        ],
-    };
-    frames::put(under.directory.path(), frames::FIELDS, instant, frame)
+        cells: Cells::Hexahedra,
+        points: cells.iter().flat_map(corners).collect(),
+        fields: fields.all(|velocity| velocity, stresses),
+    }
+}
+
+/// Corners of a cell: round its base, then round its top.
+fn corners(cell: &SpaceFields) -> [[f64; 3]; 8] {
+    let ([x0, y0, z0], [x1, y1, z1]) = (cell.lower, cell.upper);
+    let round = |z: f64| [[x0, y0, z], [x1, y0, z], [x1, y1, z], [x0, y1, z]];
+    let ([a, b, c, d], [e, f, g, h]) = (round(z0), round(z1));
+    [a, b, c, d, e, f, g, h]
 }
 
 fn tables(collapse: &CylinderCollapse, course: &Course) -> Vec<Table> {

@@ -197,6 +197,21 @@ impl Recipe for GrainsScene {
         list
     }
 
+    fn plan(&self) -> Vec<(String, String)> {
+        let put = self.prepare.iter().filter_map(|step| {
+            let (name, count) = (step.clumps.as_ref()?, step.count?);
+            let balls = self.clumps.get(name)?.balls.len();
+            let how = if step.r#do == PrepareKind::Pour {
+                "poured"
+            } else {
+                "inserted"
+            };
+            let text = format!("{count} clumps {name} of {balls} balls {how} by the preparation");
+            Some(("clumps".to_owned(), text))
+        });
+        put.collect()
+    }
+
     fn groups(&self, simulation: &mut Simulation, _: &[f64]) -> Option<Vec<Option<usize>>> {
         (!self.bonds.is_empty()).then(|| fragments::by_bonds(simulation))
     }

@@ -191,6 +191,22 @@ pub(super) fn state_of<const D: usize, const C: usize>(
     })
 }
 
+/// Puts the volumes that flowed through open ends into a checkpoint.
+pub(super) fn put_passed(state: &SurfaceState, record: &mut Record) {
+    record
+        .numbers
+        .insert("passed".to_owned(), state.passed.to_vec());
+}
+
+/// The state in a checkpoint of a flow with open ends.
+pub(super) fn state_with_passed(record: &Record) -> Option<SurfaceState> {
+    let passed = record.numbers.get("passed")?.as_slice().try_into().ok()?;
+    Some(SurfaceState {
+        passed,
+        ..state_of(record)?
+    })
+}
+
 /// The rows of columns that were stored one after the other.
 pub(super) fn columns<const N: usize>(all: &[f64]) -> [Vec<f64>; N] {
     let rows = all.len() / N;

@@ -12,7 +12,7 @@ mod sample;
 
 use super::comet;
 use super::world::fragments;
-use super::world::workshop::INTERRUPTED;
+use super::world::workshop::Surroundings;
 use super::world::{Course, Expected, Ran, Recipe, Workshop, World};
 use crate::failure::Failure;
 use crate::scene::world::{Materials, OutputKeys, Place, StepKeys};
@@ -29,7 +29,10 @@ use std::f64::consts::PI;
 const SEATING: f64 = 0.01;
 /// Damping of the seating, over √(g/d).
 const SEATING_DAMPING: f64 = 10.0;
-/// Longest time of it, in √(d/g): so damped, a grain falls two diameters in it.
+/// Kinetic energy at which a sample counts as seated (m g d): drag bears a tenth of the weight then; in free fall it
+/// bears all of it, at a hundred times this.
+const SEATED: f64 = 5e-5;
+/// Longest time of it, in √(d/g): so damped, a sample falls two diameters in it.
 const SEATING_PATIENCE: f64 = 20.0;
 
 /// Strengths of 1–2 mm grains (Pa): Kappel et al. (2020, §4.3) give them for 10–20 mm and 0.2–0.4 mm, scaled
@@ -377,31 +380,43 @@ impl TensileScene {
             }
             ClampKind::Wall => {
                 around.walls = vec![self.wall(0)];
+                // Grains that were cut off would fall for ever.
+                shop.keep_heaviest();
                 shop.relax(&around, &relaxation)?;
-                let weight = SEATING * self.rumpf(shop.materials);
-                let g = weight / (self.material.bulk_density * self.sample.height);
-                around.gravity = Vector3::new(0.0, 0.0, -g);
-                let seating = Relaxation {
-                    damping: SEATING_DAMPING,
-                    rest: Rest {
-                        kinetic: 1e-8,
-                        unbalanced: 1e9,
-                    },
-                    patience: SEATING_PATIENCE,
-                    ..Relaxation::under(g)
-                };
-                shop.relax(&around, &seating).map_err(|failure| match failure {
-                    Failure::Run(why) if why != INTERRUPTED => Failure::Run(format!(
-                        "the sample does not come to rest in a cone that is a wall (key `clamp.kind`) under a weight of {weight:.2e} \
-                         Pa, {SEATING} of its strength by Rumpf: it slides through or comes apart; \"gripped\" holds it: {why}"
-                    )),
-                    other => other,
-                })?;
+                self.seat(shop, &mut around)?;
             }
         }
         let acceleration = relaxation.acceleration;
         shop.measure(&around, &self.middle(), acceleration)
             .map(drop)
+    }
+
+    /// Seats a sample in its cone under a small weight; what comes loose of it meanwhile is taken away.
+    fn seat(&self, shop: &mut Workshop, around: &mut Surroundings) -> Result<(), Failure> {
+        let weight = SEATING * self.rumpf(shop.materials);
+        let g = weight / (self.material.bulk_density * self.sample.height);
+        around.gravity = Vector3::new(0.0, 0.0, -g);
+        let seating = Relaxation {
+            damping: SEATING_DAMPING,
+            rest: Rest {
+                kinetic: SEATED,
+                unbalanced: 1e9,
+            },
+            patience: SEATING_PATIENCE,
+            ..Relaxation::under(g)
+        };
+        while !shop.relax_as_far(around, &seating)? {
+            // What has come loose falls on.
+            if shop.keep_heaviest() == 0 {
+                return Err(Failure::Run(format!(
+                    "the sample does not come to rest in a cone that is a wall (key `clamp.kind`) under a weight of {weight:.2e} \
+                     Pa, {SEATING} of its strength by Rumpf: it slides through; a head that is higher (key `clamp.height` = {}) \
+                     or parcels that are smaller (key `coarse_graining` = {}) may hold; \"gripped\" does",
+                    self.clamp.height, self.coarse_graining
+                )));
+            }
+        }
+        Ok(())
     }
 
     /// The samples of a packing.

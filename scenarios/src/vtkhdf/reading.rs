@@ -3,7 +3,7 @@
 use super::{Cells, Field, Frame, Values};
 use crate::failure::Failure;
 use crate::results_file::{read_attribute, reason};
-use hdf5::Dataset;
+use hdf5::{Dataset, Group};
 use std::path::Path;
 
 /// Reads a file of one frame that [`super::write()`] has written.
@@ -32,25 +32,7 @@ fn read_one(path: &Path) -> hdf5::Result<Frame> {
 
 fn read(path: &Path) -> hdf5::Result<Vec<Frame>> {
     let root = hdf5::File::open(path)?.group("VTKHDF")?;
-    // There may be no cells at this instant; the fields are over something nevertheless.
-    let all = |name: &str| -> hdf5::Result<i64> {
-        let counts = root
-            .dataset(&format!("Polygons/{name}"))?
-            .read_raw::<i64>()?;
-        Ok(counts.iter().sum())
-    };
-    let (corners, polygons) = (all("NumberOfConnectivityIds")?, all("NumberOfCells")?);
-    let cells = if polygons > 0 {
-        if corners == 3 * polygons {
-            Cells::Triangles
-        } else {
-            Cells::Quadrilaterals
-        }
-    } else if root.link_exists(Cells::Lines.data()) {
-        Cells::Lines
-    } else {
-        Cells::Points
-    };
+    let cells = kind_of(&root)?;
     let times: Vec<f64> = root.dataset("Steps/Values")?.read_raw()?;
     let sizes: Vec<i64> = root.dataset("NumberOfPoints")?.read_raw()?;
     if sizes.len() != times.len() {
@@ -58,10 +40,18 @@ fn read(path: &Path) -> hdf5::Result<Vec<Frame>> {
     }
     let all = vectors(&root.dataset("Points")?)?;
     let mut frames = Vec::with_capacity(times.len());
+    let mut corners = match cells {
+        Cells::Hexahedra => Corners::of(&root)?,
+        _ => Corners::default(),
+    };
     let mut begin = 0;
     for (&time, &size) in times.iter().zip(&sizes) {
         let end = begin + usize::try_from(size).map_err(|e| e.to_string())?;
-        let points = all.get(begin..end).ok_or("points are missing")?.to_vec();
+        let own = all.get(begin..end).ok_or("points are missing")?;
+        let points = match cells {
+            Cells::Hexahedra => corners.next_of(own)?,
+            _ => own.to_vec(),
+        };
         frames.push(Frame {
             time,
             cells,
@@ -97,6 +87,62 @@ fn read(path: &Path) -> hdf5::Result<Vec<Frame>> {
         }
     }
     Ok(frames)
+}
+
+/// Kind of the cells of a file. There may be none at this instant; the fields are over something nevertheless.
+fn kind_of(root: &Group) -> hdf5::Result<Cells> {
+    if root.link_exists("Connectivity") {
+        return Ok(Cells::Hexahedra);
+    }
+    let all = |name: &str| -> hdf5::Result<i64> {
+        let counts = root.dataset(&format!("Polygons/{name}"))?;
+        Ok(counts.read_raw::<i64>()?.iter().sum())
+    };
+    let (corners, polygons) = (all("NumberOfConnectivityIds")?, all("NumberOfCells")?);
+    Ok(if polygons > 0 && corners == 3 * polygons {
+        Cells::Triangles
+    } else if polygons > 0 {
+        Cells::Quadrilaterals
+    } else if root.link_exists(Cells::Lines.data()) {
+        Cells::Lines
+    } else {
+        Cells::Points
+    })
+}
+
+/// Numbers of the shared points at the corners of cells, step by step.
+#[derive(Default)]
+struct Corners {
+    all: Vec<i64>,
+    counts: std::vec::IntoIter<i64>,
+    read: usize,
+}
+
+impl Corners {
+    fn of(root: &Group) -> hdf5::Result<Corners> {
+        let counts: Vec<i64> = root.dataset("NumberOfConnectivityIds")?.read_raw()?;
+        Ok(Corners {
+            all: root.dataset("Connectivity")?.read_raw()?,
+            counts: counts.into_iter(),
+            read: 0,
+        })
+    }
+
+    /// The points of the next step, cell by cell.
+    fn next_of(&mut self, points: &[[f64; 3]]) -> hdf5::Result<Vec<[f64; 3]>> {
+        let count = self.counts.next().and_then(|n| usize::try_from(n).ok());
+        let end = self.read + count.ok_or("corners are missing")?;
+        let ids = self.all.get(self.read..end).ok_or("corners are missing")?;
+        self.read = end;
+        let at = |id: &i64| usize::try_from(*id).ok().and_then(|id| points.get(id));
+        ids.iter()
+            .map(|id| {
+                at(id)
+                    .copied()
+                    .ok_or_else(|| "a corner has no point".into())
+            })
+            .collect()
+    }
 }
 
 impl Values {

@@ -44,16 +44,13 @@ fn at_start(table: &Table, column: &str) -> Vec<(f64, f64)> {
         .collect()
 }
 
-/// Pictures of a collapse.
-pub(super) fn collapse(profiles: &Table, front: Option<&Table>) -> Markup {
+/// The profiles at some instants, and the ground if there is any.
+pub(super) fn shapes(profiles: &Table, height: &str) -> Plot {
     let instants = instants(profiles);
     let every = instants.len().div_ceil(CURVES).max(1);
     let ground: Vec<(f64, f64)> = at_start(profiles, "z_ground");
     let mut shapes = if ground.is_empty() {
-        Plot::new(
-            &format!("{} [m]", along(profiles)),
-            "height of the heap h [m]",
-        )
+        Plot::new(&format!("{} [m]", along(profiles)), height)
     } else {
         Plot::new("x [m]", "height z [m]")
     };
@@ -70,6 +67,12 @@ pub(super) fn collapse(profiles: &Table, front: Option<&Table>) -> Markup {
         });
         shapes = shapes.with("ground", Mark::Line, 6, ground);
     }
+    shapes
+}
+
+/// Pictures of a collapse.
+pub(super) fn collapse(profiles: &Table, front: Option<&Table>) -> Markup {
+    let shapes = shapes(profiles, "height of the heap h [m]");
     html! {
         h2 { "Collapse" }
         div.figures {

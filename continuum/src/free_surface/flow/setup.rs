@@ -1,0 +1,199 @@
+//! How a flow with a moving surface is set up: material at rest on its grid, over ground, between side walls,
+//! with open ends.
+
+use super::{Bed, INACTIVE, SpaceFlow, Spent, SurfaceFlow, SurfaceOptions, SurfaceState};
+use crate::discretisation::COMPONENTS;
+use crate::error::{Error, require};
+use crate::free_surface::ground::contact::sliding_place;
+use crate::free_surface::ground::faces::faces_over;
+use crate::free_surface::ground::{Contact, Ground, Terrain};
+use crate::free_surface::open_ends::{Inflow, can_open};
+use crate::free_surface::operators::{POINTS, points_of};
+use crate::free_surface::topology::{NONE, Topology};
+use crate::free_surface::transport::Transport;
+use crate::grid::{DIMENSIONS, Grid};
+use crate::rheology::Rheology;
+use crate::wall_friction::SideWalls;
+use crate::yield_step::FlowState;
+
+/// Cells over ground that miss less of being full count as full.
+const FULL_TO: f64 = 1e-11;
+
+impl<R: Rheology> SurfaceFlow<R> {
+    /// Material at rest that fills the given fraction of each cell of a plane grid, x fastest.
+    ///
+    /// # Errors
+    /// Settings out of range.
+    pub fn at_rest(
+        grid: Grid,
+        fractions: Vec<f64>,
+        rheology: R,
+        acceleration: [f64; DIMENSIONS],
+        options: SurfaceOptions,
+    ) -> Result<Self, Error> {
+        Self::filling(grid, fractions, rheology, acceleration, options)
+    }
+
+    /// The same flow with open ends along x: this flows in at the low one, and what comes to the high one flows
+    /// out. Both stand for smooth walls of the grid, over a floor that does not cut its cells.
+    ///
+    /// # Errors
+    /// An inflow that does not fit the grid, ends that are not smooth walls, or ground.
+    pub fn with_open_ends(mut self, inflow: Inflow) -> Result<Self, Error> {
+        let axis = &self.grid.axes()[0];
+        let ends = [0, axis.cells()].map(|face| axis.boundary_at(face));
+        let fits = self.bed.is_none() && ends.iter().all(|end| can_open(end.as_ref()));
+        require(
+            fits,
+            "inflow",
+            axis.spacing() * axis.cells() as f64,
+            "a grid of this length with smooth walls at both ends of x and a level floor",
+        )?;
+        inflow.validate(self.grid.axes()[1].cells())?;
+        inflow.impose(&self.topology, &mut self.state.velocity);
+        self.saved.clone_from(&self.state);
+        self.inflow = Some(inflow);
+        Ok(self)
+    }
+
+    /// Material at rest over ground, in natural units. Fractions are of whole cells, and at most what the
+    /// ground leaves free of each.
+    ///
+    /// # Errors
+    /// Settings out of range, or ground that does not span the grid.
+    pub fn over_ground(
+        grid: Grid,
+        terrain: &Terrain,
+        fractions: Vec<f64>,
+        rheology: R,
+        acceleration: [f64; DIMENSIONS],
+        options: SurfaceOptions,
+    ) -> Result<Self, Error> {
+        let topology = Topology::rising(&grid, terrain.rise);
+        let ground = Ground::new(&grid, &topology, terrain)?;
+        let mut flow = Self::at_rest(grid, fractions, rheology, acceleration, options)?;
+        let full = flow.state.fractions.iter_mut().zip(&ground.free);
+        for (fraction, free) in full {
+            *fraction = fraction.min(*free);
+            // Full but for the round-off of the two ways to the same number.
+            if free - *fraction < FULL_TO {
+                *fraction = *free;
+            }
+        }
+        if let Contact::Coulomb(_) = terrain.contact {
+            let cells = topology.cells();
+            let points = sliding_place(cells, cells);
+            flow.state.stress.resize(points, [0.0; COMPONENTS]);
+        }
+        flow.topology = topology;
+        flow.set_weight_for_pressure();
+        flow.saved.clone_from(&flow.state);
+        flow.bed = Some(Bed {
+            ground,
+            faces: faces_over,
+            operators: |material, ground| material.operators_over(ground),
+        });
+        Ok(flow)
+    }
+
+    /// The same flow between side walls at a distance along y, in natural units: they rub on what
+    /// moves with 2 c/W + (2 μ/W) p per volume.
+    ///
+    /// # Errors
+    /// Walls out of range.
+    pub fn between_side_walls(mut self, walls: SideWalls) -> Result<Self, Error> {
+        walls.validate()?;
+        self.side_walls = Some(walls);
+        let points = 2 * self.topology.cells() * POINTS;
+        let points = points.max(self.state.stress.len());
+        self.state.stress.resize(points, [0.0; COMPONENTS]);
+        self.saved.clone_from(&self.state);
+        Ok(self)
+    }
+}
+
+impl<R: Rheology> SpaceFlow<R> {
+    /// Material at rest that fills the given fraction of each cell of a grid in space, x fastest and z
+    /// slowest.
+    ///
+    /// # Errors
+    /// Settings out of range.
+    pub fn in_space(
+        grid: Grid<3>,
+        fractions: Vec<f64>,
+        rheology: R,
+        acceleration: [f64; 3],
+        options: SurfaceOptions,
+    ) -> Result<Self, Error> {
+        Self::filling(grid, fractions, rheology, acceleration, options)
+    }
+}
+
+impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R, D, C, V> {
+    fn filling(
+        grid: Grid<D>,
+        fractions: Vec<f64>,
+        rheology: R,
+        acceleration: [f64; D],
+        options: SurfaceOptions,
+    ) -> Result<Self, Error> {
+        options.validate()?;
+        let topology = Topology::new(&grid);
+        let state = SurfaceState {
+            velocity: std::array::from_fn(|c| vec![0.0; topology.faces(c)]),
+            pressure: vec![INACTIVE; topology.cells()],
+            stress: vec![[0.0; C]; topology.cells() * points_of(D)],
+            fractions,
+            ..SurfaceState::default()
+        };
+        Ok(Self {
+            saved: state.clone(),
+            state,
+            planes: Vec::new(),
+            transport: Transport::default(),
+            side_walls: None,
+            bed: None,
+            inflow: None,
+            outside: None,
+            untaken: [0.0; DIMENSIONS],
+            filled: Vec::new(),
+            solver: None,
+            unknowns: FlowState {
+                u: Vec::new(),
+                p: Vec::new(),
+                s: Vec::new(),
+            },
+            momentum: Vec::new(),
+            divergence: Vec::new(),
+            spent: Spent::default(),
+            grid,
+            topology,
+            rheology,
+            acceleration,
+            options,
+        })
+    }
+
+    /// Starts with the pressure of the weight of what lies above, which is exact under level surfaces.
+    fn set_weight_for_pressure(&mut self) {
+        let axis = D - 1;
+        let per_cell = -self.acceleration[axis] * self.grid.axes()[axis].spacing();
+        if per_cell <= 0.0 {
+            return;
+        }
+        let fractions = &self.state.fractions;
+        for cell in (0..self.topology.cells()).rev() {
+            let above = self.topology.cell_neighbours[cell][axis][1];
+            if fractions[cell] > 0.0 {
+                let load = match above {
+                    NONE => 0.0,
+                    above if fractions[above] > 0.0 => {
+                        self.state.pressure[above] + 0.5 * per_cell * fractions[above].max(0.0)
+                    }
+                    _ => 0.0,
+                };
+                self.state.pressure[cell] = load + 0.5 * per_cell * fractions[cell];
+            }
+        }
+    }
+}

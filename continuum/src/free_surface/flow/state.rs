@@ -1,0 +1,154 @@
+//! Settings and state of a flow with a moving surface, and what a step of it reports.
+
+use serde::{Deserialize, Serialize};
+
+use crate::discretisation::COMPONENTS;
+use crate::error::{Error, require};
+use crate::free_surface::faces::ThinLayer;
+use crate::free_surface::fields::CellFields;
+use crate::grid::DIMENSIONS;
+use crate::strain::SPACE_COMPONENTS;
+use crate::yield_step::{PrimalDualOptions, Residuals};
+
+/// Settings of a flow with a moving surface, in natural units.
+#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
+#[serde(deny_unknown_fields, default)]
+pub struct SurfaceOptions {
+    /// Largest Δt Σ |u|/h over the axes, at most 1. Above ½ material moves in two parts with one
+    /// velocity.
+    pub courant: f64,
+    /// Largest time step.
+    pub largest_step: f64,
+    /// Factor by which a time step may exceed the one before.
+    pub growth: f64,
+    /// How layers thinner than half a cell move over rough walls.
+    pub thin_layer: ThinLayer,
+    /// The solver of the implicit part.
+    pub solver: PrimalDualOptions,
+}
+
+impl Default for SurfaceOptions {
+    fn default() -> Self {
+        Self {
+            courant: 0.45,
+            largest_step: 0.05,
+            growth: 1.3,
+            thin_layer: ThinLayer::default(),
+            solver: PrimalDualOptions {
+                strain_rate_floor: 1e-5,
+                momentum_tolerance: 1e-5,
+                divergence_tolerance: 1e-8,
+                stress_tolerance: 1e-4,
+                tolerance_in_motion: 50.0,
+                one_sided_pressure: true,
+                ..PrimalDualOptions::default()
+            },
+        }
+    }
+}
+
+impl SurfaceOptions {
+    /// Refuses settings that cannot work.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] with the key, the value and the allowed range.
+    pub fn validate(&self) -> Result<(), Error> {
+        require(
+            self.courant > 0.0 && self.courant <= 1.0,
+            "solver.courant",
+            self.courant,
+            "greater than 0, at most 1: no velocity is known farther than a cell from the material",
+        )?;
+        require(
+            self.largest_step > 0.0,
+            "solver.largest_step",
+            self.largest_step,
+            "greater than 0 and finite",
+        )?;
+        require(
+            self.growth > 1.0,
+            "solver.growth",
+            self.growth,
+            "greater than 1 and finite",
+        )
+    }
+}
+
+/// What one step of a flow with a moving surface did.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct SurfaceStep {
+    /// Time at the end of the step.
+    pub time: f64,
+    /// Time step.
+    pub dt: f64,
+    /// Cells with a pressure.
+    pub active_cells: usize,
+    /// Newton iterations, those of failed attempts included.
+    pub newton_iterations: usize,
+    /// Steps that were cut and tried again.
+    pub cuts: usize,
+    /// Points whose friction went by the pressure before the step ([`crate::yield_step::StepReport::held_points`]).
+    pub held_points: usize,
+    /// Residuals of the equations.
+    pub residuals: Residuals,
+    /// Largest speed of material.
+    pub max_speed: f64,
+}
+
+/// State of a flow with a moving surface, on all of its grid.
+#[derive(Debug, Clone, PartialEq)]
+pub struct SurfaceState<const D: usize = DIMENSIONS, const C: usize = COMPONENTS> {
+    /// Fraction of each cell that is filled.
+    pub fractions: Vec<f64>,
+    /// Velocity on each face of each component.
+    pub velocity: [Vec<f64>; D],
+    /// Pressure of each cell, negative where there is none.
+    pub pressure: Vec<f64>,
+    /// Stress at each corner of each cell, then the traction of side walls there if there are any, then
+    /// that of ground in each cell under Coulomb friction.
+    pub stress: Vec<[f64; C]>,
+    /// Time of the fractions.
+    pub time: f64,
+    /// Time of the velocity, half a step ahead.
+    pub velocity_time: f64,
+    /// Time step that the velocity is meant for; zero before the first.
+    pub next_step: f64,
+    /// Volumes that have flowed in and out through open ends.
+    pub passed: [f64; 2],
+    /// Steps made.
+    pub steps: usize,
+}
+
+impl<const D: usize, const C: usize> Default for SurfaceState<D, C> {
+    fn default() -> Self {
+        Self {
+            fractions: Vec::new(),
+            velocity: std::array::from_fn(|_| Vec::new()),
+            pressure: Vec::new(),
+            stress: Vec::new(),
+            time: 0.0,
+            velocity_time: 0.0,
+            next_step: 0.0,
+            steps: 0,
+            passed: [0.0; 2],
+        }
+    }
+}
+
+/// Wall time by phase of the step (s).
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct Spent {
+    /// Moving volume and momentum.
+    pub transport: f64,
+    /// Finding the unknowns and making their operators.
+    pub operators: f64,
+    /// Analysing the pattern of the matrix.
+    pub analysis: f64,
+    /// Newton's method: assembly, factors, Krylov iterations.
+    pub newton: f64,
+}
+
+/// Fields of a cell of a [`super::SpaceFlow`].
+pub type SpaceFields = CellFields<3, SPACE_COMPONENTS>;
+/// The state of a [`super::SpaceFlow`].
+pub type SpaceState = SurfaceState<3, SPACE_COMPONENTS>;

@@ -1,0 +1,106 @@
+//! Keys of a chute that is fed at its upper end and open at its lower one.
+
+use super::collapse::{check_rheology, out_of_range};
+use super::{CollapseSolver, RheologyKeys, SceneError};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// A layer that enters a rough chute at one end and leaves it at the other.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OpenChuteScene {
+    /// Inclination to the horizontal (degrees).
+    #[schemars(extend("minimum" = 0.0, "exclusiveMaximum" = 90.0))]
+    pub slope_degrees: f64,
+    /// Depth of the layer that enters, normal to the chute (m).
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e5))]
+    pub depth: f64,
+    /// Gravity (m/s²).
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
+    pub gravity: f64,
+    /// Time over √(depth/gravity).
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e4))]
+    pub duration_scaled: f64,
+    /// Size of the run: cells along each axis grow with it.
+    #[schemars(extend("minimum" = 0.1, "maximum" = 64.0))]
+    pub scale: f64,
+    /// The material.
+    pub rheology: RheologyKeys,
+    /// What enters.
+    pub inflow: InflowKeys,
+    /// The grid.
+    pub grid: OpenChuteGrid,
+    /// The solver.
+    pub solver: CollapseSolver,
+}
+
+/// What enters; one of the two is given.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct InflowKeys {
+    /// Factor on the steady profile of a layer of that depth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 100.0))]
+    pub bagnold_factor: Option<f64>,
+    /// Speed at all heights (m/s).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e4))]
+    pub speed: Option<f64>,
+}
+
+/// The grid.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct OpenChuteGrid {
+    /// Cells across the depth at scale 1; they are square.
+    #[schemars(extend("minimum" = 4, "maximum" = 1024))]
+    pub cells: u64,
+    /// Length of the chute over the depth.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
+    pub length_scaled: f64,
+    /// Height of the grid over the depth.
+    #[schemars(extend("exclusiveMinimum" = 1.0, "maximum" = 100.0))]
+    pub room_scaled: f64,
+}
+
+/// Keys of which one is given.
+pub(super) const INFLOWS: &[&str] = &["inflow.bagnold_factor", "inflow.speed"];
+
+/// Most cells that hold material: their matrix has to fit into memory.
+const LARGEST_CHUTE: f64 = 200_000.0;
+
+impl OpenChuteScene {
+    /// Cells across the depth at this scale.
+    pub fn cells(&self) -> usize {
+        (self.grid.cells as f64 * self.scale).round().max(4.0) as usize
+    }
+
+    /// Cells that hold material.
+    pub fn filled(&self) -> f64 {
+        let cells = self.cells() as f64;
+        cells * cells * self.grid.length_scaled
+    }
+
+    pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {
+        let filled = self.filled();
+        if filled > LARGEST_CHUTE {
+            return Err(out_of_range(
+                origin,
+                "grid.cells",
+                self.grid.cells.to_string(),
+                format!(
+                    "at most {LARGEST_CHUTE} cells in the chute, here {filled:.0} at scale {} and grid.length_scaled = {}",
+                    self.scale, self.grid.length_scaled
+                ),
+            ));
+        }
+        if self.inflow.bagnold_factor.is_none() && self.inflow.speed.is_none() {
+            return Err(SceneError::MissingKey {
+                file: origin.to_owned(),
+                key: INFLOWS[0].into(),
+                wanted: format!("a factor on the steady profile, or {} in m/s", INFLOWS[1]),
+            });
+        }
+        check_rheology(&self.rheology, origin)
+    }
+}

@@ -1,0 +1,97 @@
+//! A chute that is fed and open, from the command line.
+
+#![allow(clippy::unwrap_used)] // a test may panic
+
+mod command;
+
+use colluvium::vtkhdf;
+use command::{colluvium, succeed, summary, table, value};
+
+/// Half the cells and a short chute.
+const SMALL: [&str; 4] = ["--set", "scale=0.5", "--set", "grid.length_scaled=2.5"];
+
+/// Fed with the steady profile the layer passes through as it is. Fed with 0.7 of it the layer speeds up and
+/// thins, and a slow plug is far from steady half way down: negative controls. Volume is accounted for in all.
+#[test]
+fn fed_layers_pass_through_and_others_do_not_stay() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |run: &str, name: &str| folder.path().join(run).join(name);
+    let run = |out: &str, sets: &[&str]| {
+        let mut list = vec!["run", "open-chute", "--out", out];
+        list.extend(SMALL);
+        sets.iter().for_each(|set| list.extend(["--set", set]));
+        succeed(folder.path(), &list);
+        let found = summary(&folder.path().join(out));
+        assert_eq!(found["status"], "done");
+        assert!(value(&found, "volume_error").abs() < 1e-13);
+        ["velocity_from_steady", "depth_at_end"].map(|name| value(&found, name))
+    };
+    let [distance, depth] = run("steady", &[]);
+    assert!(
+        distance < 0.01 && (depth / 0.05 - 1.0).abs() < 0.01,
+        "{distance} {depth}"
+    );
+    let [distance, depth] = run("slower", &["inflow.bagnold_factor=0.7"]);
+    assert!(distance > 0.1 && depth < 0.049, "{distance} {depth}");
+    let [distance, _] = run("plug", &["inflow.speed=0.4", "grid.room_scaled=1.8"]);
+    assert!(distance > 0.3, "{distance}");
+
+    let (header, balance) = table(&at("plug", "balance.csv"));
+    assert_eq!(header, ["t", "volume", "entered", "left"]);
+    let (first, last) = (&balance[0], &balance[balance.len() - 1]);
+    assert!(first[2] == 0.0 && first[3] == 0.0);
+    // What enters is a plug 0.05 m deep at 0.4 m/s.
+    let entered = 0.05 * 0.4 * last[0];
+    assert!((last[2] / entered - 1.0).abs() < 1e-9, "{last:?}");
+    assert!((first[1] + last[2] - last[3] - last[1]).abs() < 1e-12);
+    let (header, speeds) = table(&at("steady", "speeds.csv"));
+    assert_eq!(header, ["z", "u", "u_steady"]);
+    assert!(speeds.len() >= 8 && speeds.windows(2).all(|pair| pair[1][1] > pair[0][1]));
+    let report = std::fs::read_to_string(at("plug", "report.html")).unwrap();
+    assert!(report.contains("Speed half way down") && report.contains("has come in"));
+    let frames = vtkhdf::read_series(&at("plug", "fields.vtkhdf")).unwrap();
+    assert!(frames.len() > 5 && frames[0].scalars("pressure").unwrap().len() == 8 * 20);
+}
+
+#[test]
+fn chutes_are_planned_and_bad_ones_refused_by_key() {
+    let folder = tempfile::tempdir().unwrap();
+    let planned = colluvium(folder.path(), &["plan", "open-chute"]);
+    let planned = String::from_utf8_lossy(&planned.stdout).into_owned();
+    assert!(
+        planned.contains("enters a rough chute") && planned.contains("cell-steps"),
+        "{planned}"
+    );
+    for (set, key, allowed) in [
+        ("slope_degrees=34", "slope_degrees", "accelerate for ever"),
+        ("slope_degrees=10", "slope_degrees", "flows"),
+        ("inflow.speed=-1", "inflow.speed", "(0, 10000]"),
+        ("inflow.depth=1", "inflow.depth", "bagnold_factor, speed"),
+        ("grid.room_scaled=1.05", "grid.room_scaled", "two cells"),
+        ("grid.length_scaled=0.1", "grid.length_scaled", "at least"),
+        ("grid.cells=500", "grid.cells", "at most 200000"),
+        ("solver.courant=2", "solver.courant", "1"),
+    ] {
+        let arguments = ["run", "open-chute", "--out", "x", "--set", set];
+        let refused = colluvium(folder.path(), &arguments);
+        assert_eq!(refused.status.code(), Some(2), "{set}");
+        let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert!(
+            message.contains(key) && message.contains(allowed),
+            "{set}: {message}"
+        );
+        assert!(!folder.path().join("x").exists());
+    }
+    let both = [
+        "run",
+        "open-chute",
+        "--out",
+        "x",
+        "--set",
+        "inflow.speed=1",
+        "--set",
+        "inflow.bagnold_factor=1",
+    ];
+    let refused = colluvium(folder.path(), &both);
+    assert_eq!(refused.status.code(), Some(2));
+}
