@@ -361,14 +361,14 @@ impl MaterialEdge {
     /// the grains of nearby labels.
     pub(super) fn surface_of(&self, label: f64) -> Vec<f64> {
         let band = BAND * self.spec.case.rheology.diameter;
-        let place = self.spec.place + self.labels.edge;
         let mut sums = vec![[0.0; 2]; self.cells.counts[1]];
         for grain in &self.sighting.snapshot.grains {
             let Some(own) = self.labels.of(grain) else {
                 continue;
             };
             if (own - label).abs() < band {
-                let moved = grain.position.x - place - own;
+                let base = self.labels.base_at(&self.cells, grain.position.z);
+                let moved = grain.position.x - base - own;
                 for (row, hat) in self.cells.rows(grain.position.z) {
                     sums[row][0] += grain.mass * hat;
                     sums[row][1] += grain.mass * hat * moved;
@@ -376,10 +376,10 @@ impl MaterialEdge {
             }
         }
         let least = LEAST_ROW * self.spec.density() * band * self.cells.spacing * self.spec.slab;
-        let start = place + label;
-        displacements(&sums, least)
-            .into_iter()
-            .map(|moved| start + moved)
+        let moved = displacements(&sums, least).into_iter();
+        moved
+            .zip(&self.labels.base)
+            .map(|(moved, base)| base + label + moved)
             .collect()
     }
 }

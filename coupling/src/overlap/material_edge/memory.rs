@@ -47,7 +47,8 @@ impl MaterialEdge {
             self.held.reach,
         ]);
         put(&self.monitors.numbers());
-        put(&self.labels.start);
+        put(&self.labels.given);
+        put(&self.labels.base);
         let journey = &self.journey;
         put(&[
             self.labels.edge,
@@ -111,6 +112,9 @@ impl MaterialEdge {
             return Ok(None);
         };
         let mut edge = Self::around(spec, [mass, rest_mass], labels.to_vec(), simulation)?;
+        let Some(base) = take() else {
+            return Ok(None);
+        };
         let Some(&[at, resting, returns, refused, displaced, strips]) = take() else {
             return Ok(None);
         };
@@ -121,6 +125,10 @@ impl MaterialEdge {
         let Some(strips) = strips.collect() else {
             return Ok(None);
         };
+        if base.len() != edge.labels.base.len() {
+            return Ok(None);
+        }
+        edge.labels.base = base.to_vec();
         edge.labels.edge = at;
         edge.journey = Journey {
             strips,

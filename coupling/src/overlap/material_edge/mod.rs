@@ -103,13 +103,29 @@ impl MaterialEdgeSpec {
     }
 }
 
-/// Labels of grains: distances from the first edge along x at the start.
+/// Labels of grains: distances from the edge along x when they were given, at the start or when the edge moved on.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Labels {
     /// By grain number; [`NO_LABEL`] for what has none (m).
-    start: Vec<f64>,
-    /// Label of the edge (m).
+    given: Vec<f64>,
+    /// Where the edge was then, row by row (m).
+    base: Vec<f64>,
+    /// How far it has moved on since the start (m).
     edge: f64,
+}
+
+impl Labels {
+    /// Distance of a grain's label from that of the edge (m); none of what has none.
+    fn of(&self, grain: &GrainSample) -> Option<f64> {
+        let label = self.given.get(grain.id as usize).copied();
+        label.filter(|label| *label < NO_LABEL && !grain.fixed)
+    }
+
+    /// Where the edge was at a height when labels were given (m).
+    fn base_at(&self, cells: &Cells, z: f64) -> f64 {
+        let rows = cells.rows(z).into_iter();
+        rows.map(|(row, hat)| hat * self.base[row]).sum()
+    }
 }
 
 /// What acts on the grains until the next exchange.
@@ -252,7 +268,8 @@ impl MaterialEdge {
             continuum_mass: mass,
             rest_mass,
             labels: Labels {
-                start: labels,
+                given: labels,
+                base: vec![spec.place; cells.counts[1]],
                 edge: 0.0,
             },
             journey: Journey::default(),

@@ -9,12 +9,13 @@
 //!   the continuum's velocity. Where one of them would lie in a grain that has come there meanwhile, it is laid on top
 //!   of the heap instead, so that no mass is lost.
 //!
+//! A move gives all labels anew, by where grains are: what has mixed since they were given is cut along a clean edge.
 //! Each return doubles the rest that the next move outwards waits for: the two thresholds and this keep the edge from
 //! going to and fro. A move inwards that a budget of grains does not allow is refused and counted. Mass changes hands
 //! at the edge alone, by whole strips; momentum that goes with it is booked. Every move is kept with its reason
 //! ([`Move`]).
 
-use super::{Labels, MaterialEdge, OverlapError};
+use super::{MaterialEdge, OverlapError};
 use colluvium_dem::{Grain, GrainSample, Patch, Simulation};
 use nalgebra::Vector3;
 
@@ -132,7 +133,8 @@ impl MaterialEdge {
     }
 
     fn strip(&self, grain: &GrainSample, width: f64) -> Option<usize> {
-        let floor = self.spec.place + self.labels.edge - self.spec.settings.inner;
+        let base = self.labels.base.iter().copied();
+        let floor = base.fold(f64::INFINITY, f64::min) - self.spec.settings.inner;
         let fixed = grain.fixed;
         strip_of(
             self.labels.of(grain),
@@ -225,12 +227,25 @@ impl MaterialEdge {
         (super::cells::over(sum, mass).sqrt(), beyond)
     }
 
+    /// Gives all grains labels anew, for an edge at these places row by row (m).
+    fn give_labels(&mut self, places: Vec<f64>) {
+        self.labels.base = places;
+        for grain in self.sighting.snapshot.grains.iter().filter(|g| !g.fixed) {
+            let base = self.labels.base_at(&self.cells, grain.position.z);
+            if let Some(label) = self.labels.given.get_mut(grain.id as usize) {
+                *label = grain.position.x - base;
+            }
+        }
+    }
+
     fn go_out(
         &mut self,
         travel: &Travel,
         speed: f64,
         simulation: &mut Simulation,
     ) -> Result<(), OverlapError> {
+        let places = self.surface_of(travel.width);
+        self.give_labels(places);
         self.labels.edge += travel.width;
         // The copy of what changes hands says all that its grains say.
         self.see_grains();
@@ -267,6 +282,12 @@ impl MaterialEdge {
         let before = self.grain_momentum(simulation);
         let mass = patch.mass();
         simulation.put_back(&patch)?;
+        let mut places = self.surface_of(0.0);
+        for place in &mut places {
+            *place -= travel.width;
+        }
+        self.sighting.look(simulation);
+        self.give_labels(places);
         self.labels.edge -= travel.width;
         self.journey.returns += 1.0;
         self.handed([speed, mass], before, simulation);
@@ -289,16 +310,6 @@ impl MaterialEdge {
             mass,
             grains: simulation.grain_count() as f64,
         });
-    }
-}
-
-impl Labels {
-    /// Distance of a grain's label from that of the edge (m); none of what has none.
-    pub(super) fn of(&self, grain: &GrainSample) -> Option<f64> {
-        let label = self.start.get(grain.id as usize).copied();
-        label
-            .filter(|label| *label < super::NO_LABEL && !grain.fixed)
-            .map(|label| label - self.edge)
     }
 }
 

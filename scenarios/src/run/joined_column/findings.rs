@@ -166,7 +166,7 @@ impl JoinedColumn<'_> {
         let mut tables = live.course.tables(places.clone(), deposit.clone());
         tables.extend(sides(self, ran, &live.edge, (places, deposit)));
         if scene.zones.moving {
-            tables.push(moves(scene.edge(), &live.edge, summary));
+            tables.extend(moves(scene.edge(), &live.edge, summary));
         }
         summary.figures.insert(
             0,
@@ -405,7 +405,7 @@ fn sides(
 }
 
 /// Moves of the edge with their reasons, in a table and in words.
-fn moves(place: f64, edge: &MaterialEdge, summary: &mut Summary) -> Table {
+fn moves(place: f64, edge: &MaterialEdge, summary: &mut Summary) -> Option<Table> {
     let all = edge.moves();
     let inwards = all.iter().filter(|m| m.mass > 0.0);
     let sum = |sign: f64| {
@@ -424,10 +424,11 @@ fn moves(place: f64, edge: &MaterialEdge, summary: &mut Summary) -> Table {
     ));
     let column = |f: fn(&Move) -> f64| all.iter().map(f).collect::<Vec<f64>>();
     let places = all.iter().map(|m| place + m.edge).collect();
-    Table::new("moves")
+    let table = Table::new("moves")
         .with("t", "s", column(|m| m.time))
         .with("edge", "m", places)
         .with("speed", "m/s", column(|m| m.speed))
         .with("mass", "kg", column(|m| m.mass))
-        .with("grains", "1", column(|m| m.grains))
+        .with("grains", "1", column(|m| m.grains));
+    (!all.is_empty()).then_some(table)
 }
