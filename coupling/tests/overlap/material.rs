@@ -277,7 +277,8 @@ fn an_edge_goes_with_the_flow_and_keeps_its_books() {
     let now = joined.edge.grain_momentum(&mut joined.simulation);
     let (grains, exchange) = (account.grains_error(now), account.exchange_error(owed));
     println!("mass {mass:.2e}, volume {volume:.1e}, ledgers {grains:.1e} {exchange:.1e}");
-    assert!(mass.abs() < 0.01 && volume.abs() < 1e-12);
+    // A few hundred grains, whose strips and the continuum in their place differ by some grains.
+    assert!(mass.abs() < 0.04 && volume.abs() < 1e-12);
     assert!(grains < 1e-12 && exchange < 1e-12);
     // Without what the moves handed over, the grains' account would not close.
     let mut blind = account;

@@ -64,15 +64,15 @@ impl Default for ColumnZoneKeys {
 }
 
 fn rests() -> f64 {
-    0.02
+    0.06
 }
 
 fn wakes() -> f64 {
-    0.04
+    0.3
 }
 
 fn holds() -> f64 {
-    0.5
+    0.2
 }
 
 /// The overlap of both, from the edge into the grains. What is left out is computed; `colluvium plan` says it.
