@@ -1,6 +1,7 @@
 //! A calibration campaign: inclined-plane runs at several slopes, the slopes where flow stops and starts, and
 //! the rheology fitted to them.
 
+mod candidates;
 mod causes;
 mod design;
 mod plan;
@@ -15,9 +16,9 @@ pub use verdict::Verdict;
 
 use crate::calibration::thesis::{EstimatorFit, VelocityProfile, estimator_fits};
 use crate::calibration::{
-    Alternative, BulkFlow, FreeForm, LeftOut, LocalPoint, MuIFit, Posterior, ResidualTests, Stress,
-    compare_laws, fit_free_form, fit_mu_i, left_out, pressure_ratio, residual_tests,
-    sample_posterior,
+    Alternative, BulkFlow, FluidityFit, FreeForm, LeftOut, LocalPoint, MuIFit, Posterior,
+    ResidualTests, Stress, compare_laws, fit_free_form, fit_mu_i, left_out, pressure_ratio,
+    residual_tests, sample_posterior,
 };
 use crate::incline::{Cost, InclineResult, InclineRun, InclineSpec, Purpose, Start};
 use rayon::prelude::*;
@@ -94,6 +95,9 @@ pub struct CampaignResult {
     /// Competing laws of |τ|/p, the best supported first.
     #[serde(default)]
     pub alternatives: Vec<Alternative>,
+    /// Non-local fluidity against the local law, on the profiles through the depth.
+    #[serde(default)]
+    pub fluidity: Option<FluidityFit>,
     /// A table of |τ|/p that only rises and bends downwards.
     #[serde(default)]
     pub free_form: Option<FreeForm>,
@@ -262,6 +266,12 @@ pub fn evaluate(
         cost.grain_steps += run.cost.grain_steps;
         cost.wall_s += run.cost.wall_s;
     }
+    let bulks: Vec<BulkFlow> = used.iter().filter_map(|r| bulk(spec, r)).collect();
+    let left_out: Vec<LeftOut> = [Stress::MeanPressure, Stress::NormalPressure]
+        .iter()
+        .flat_map(|stress| left_out(&bulks, *stress, spec.seed))
+        .collect();
+    let fluidity = fit_p.and_then(|fit| candidates::fluidity(&spec.base, &used, &bulks, fit));
     let verdict = verdict::judge(&verdict::Evidence {
         spec,
         flows: &flows,
@@ -277,13 +287,15 @@ pub fn evaluate(
         alternatives: &alternatives,
         posterior: &posterior,
         points: &points,
+        candidates: candidates::Candidates {
+            fluidity: &fluidity,
+            non_local: &non_local,
+            used: &used,
+            fit: fit_p,
+            left_out: &left_out,
+        },
     });
     let pressure_ratio = pressure_ratio(&points);
-    let bulks: Vec<BulkFlow> = used.iter().filter_map(|r| bulk(spec, r)).collect();
-    let left_out = [Stress::MeanPressure, Stress::NormalPressure]
-        .iter()
-        .flat_map(|stress| left_out(&bulks, *stress, spec.seed))
-        .collect();
     let [fit, fit_zz, fit_slope] = fits.map(Result::ok);
     CampaignResult {
         runs: flows
@@ -307,6 +319,7 @@ pub fn evaluate(
         non_local,
         residuals,
         alternatives,
+        fluidity,
         free_form,
         posterior,
         posterior_zz,

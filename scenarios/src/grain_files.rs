@@ -90,7 +90,8 @@ pub fn read(
         "vtkhdf" => series::read(path),
         "vtk" => std::fs::read(path)
             .map_err(|e| format!("cannot read the file: {e}"))
-            .and_then(|bytes| legacy_vtk::read(&bytes)),
+            .and_then(|bytes| legacy_vtk::read(&bytes))
+            .map(|instants| beside_vtk(instants, path, unsaid)),
         _ => dump::read(path, unsaid),
     }
     .map_err(refuse)?;
@@ -101,6 +102,16 @@ pub fn read(
         each(&snapshot(instant, unsaid).map_err(refuse)?)?;
     }
     Ok(instants.len())
+}
+
+/// With the box and the time that names of files tell.
+fn beside_vtk(mut instants: Vec<Instant>, path: &Path, unsaid: &Unsaid) -> Vec<Instant> {
+    let (domain, step) = legacy_vtk::beside(path);
+    for instant in &mut instants {
+        instant.domain = domain;
+        instant.time = step.unwrap_or(0.0) * unsaid.timestep.unwrap_or(0.0);
+    }
+    instants
 }
 
 fn snapshot(instant: &Instant, unsaid: &Unsaid) -> Result<Snapshot, String> {

@@ -1,5 +1,7 @@
 //! `rheology.toml`: a μ(I) law with its errors, its validity and its provenance.
 
+mod normal_stress;
+
 use crate::map::MapFile;
 use crate::scene::{SceneError, check_continuum_keys, layers};
 use serde::{Deserialize, Serialize};
@@ -262,13 +264,14 @@ pub fn resolve(table: &mut Table, friction: FrictionOf) -> Result<Option<PathBuf
         (_, Some(Value::Table(place))) => on_map(&place)?,
         _ => return Ok(None),
     };
-    if let (FrictionOf::NormalStress, Some(fit)) = (friction, law.mu_zz.take()) {
-        (law.mu_s, law.mu_2, law.i_0) = (fit.mu_s, fit.mu_2, fit.i_0);
-        law.check().map_err(|message| SceneError::Rheology {
-            path: source.clone(),
-            message: format!("[mu_zz]: {message}"),
-        })?;
-        source.push_str(", friction against sigma_zz");
+    if friction == FrictionOf::NormalStress && law.mu_zz.is_some() {
+        law = law
+            .against_normal_stress()
+            .map_err(|message| SceneError::Rheology {
+                path: source.clone(),
+                message: format!("[mu_zz]: {message}"),
+            })?;
+        source.push_str(", friction and I against sigma_zz");
     }
     let mut keys = law.scene_keys(&source);
     // Grains of another size obey the same law: a map's numbers give way to what is written beside it.
@@ -279,20 +282,25 @@ pub fn resolve(table: &mut Table, friction: FrictionOf) -> Result<Option<PathBuf
     Ok(path)
 }
 
-/// The law at a place on a map, the map's file, and where the law is from.
+/// The law at a place on a map, the map's file if it is not the bundled one, and where the law is from.
 fn on_map(place: &Table) -> Result<(RheologyFile, Option<PathBuf>, String), SceneError> {
     let number = |key: &str| match place.get(key) {
         Some(Value::Float(x)) => *x,
         Some(Value::Integer(n)) => *n as f64,
         _ => f64::NAN,
     };
-    let path = place.get("map").and_then(Value::as_str).unwrap_or_default();
+    let path = place.get("map").and_then(Value::as_str).map(PathBuf::from);
     let (beta, mu_r) = (number("beta"), number("mu_r"));
+    let named = || path.as_ref().map(|path| path.display().to_string());
     let fail = |message: String| SceneError::Rheology {
-        path: path.to_owned(),
+        path: named().unwrap_or_else(|| "the bundled map".into()),
         message: format!("rheology.from: {message}"),
     };
-    let law = MapFile::read(Path::new(path))?
+    let map = match &path {
+        Some(path) => MapFile::read(path)?,
+        None => MapFile::bundled()?,
+    };
+    let law = map
         .rheology(beta, mu_r)
         .map_err(|error| fail(error.to_string()))?;
     law.check().map_err(fail)?;
@@ -305,7 +313,7 @@ fn on_map(place: &Table) -> Result<(RheologyFile, Option<PathBuf>, String), Scen
         with(law.mu_2, law.mu_2_error),
         with(law.i_0, law.i_0_error)
     );
-    Ok((law, Some(PathBuf::from(path)), source))
+    Ok((law, path, source))
 }
 
 /// Makes the path of a rheology file in a scene file relative to that file's folder, unless it is the name of a bundled

@@ -39,38 +39,17 @@ pub struct Solution<const N: usize> {
     pub chi_square: f64,
 }
 
-/// Minimises Σ wₖ (yₖ − f(xₖ; p))²; `model(p, x)` returns f and ∂f/∂p, or `None` where p is not allowed.
-///
-/// # Errors
-/// [`FitError::TooFewPoints`] below N points; [`FitError::Degenerate`] if the normal matrix is singular at the
-/// solution or the start is not allowed.
-pub fn levenberg_marquardt<const N: usize>(
-    points: &[(f64, f64, f64)],
+/// JᵀWJ, JᵀW(y − f) and Σ w (y − f)² at some parameters.
+pub(super) type System<const N: usize> = (SMatrix<f64, N, N>, SVector<f64, N>, f64);
+
+/// Goes down to where the sum of squares is least; `system` gives `None` where parameters are not allowed. `None` if the start
+/// is not.
+pub(super) fn minimise<const N: usize>(
     start: SVector<f64, N>,
-    model: impl Fn(&SVector<f64, N>, f64) -> Option<(f64, SVector<f64, N>)>,
-) -> Result<Solution<N>, FitError> {
-    if points.len() < N {
-        return Err(FitError::TooFewPoints {
-            found: points.len(),
-            needed: N,
-        });
-    }
-    let system = |p: &SVector<f64, N>| {
-        let mut normal = SMatrix::<f64, N, N>::zeros();
-        let mut gradient = SVector::<f64, N>::zeros();
-        let mut chi_square = 0.0;
-        for &(x, y, weight) in points {
-            let (f, slope) = model(p, x)?;
-            normal += weight * slope * slope.transpose();
-            gradient += weight * (y - f) * slope;
-            chi_square += weight * (y - f) * (y - f);
-        }
-        chi_square
-            .is_finite()
-            .then_some((normal, gradient, chi_square))
-    };
+    system: impl Fn(&SVector<f64, N>) -> Option<System<N>>,
+) -> Option<(SVector<f64, N>, System<N>)> {
     let mut p = start;
-    let (mut normal, mut gradient, mut chi_square) = system(&p).ok_or(FitError::Degenerate)?;
+    let (mut normal, mut gradient, mut chi_square) = system(&p)?;
     let mut damping = 1e-3;
     for _ in 0..500 {
         let mut damped = normal;
@@ -104,6 +83,40 @@ pub fn levenberg_marquardt<const N: usize>(
             }
         }
     }
+    Some((p, (normal, gradient, chi_square)))
+}
+
+/// Minimises Σ wₖ (yₖ − f(xₖ; p))²; `model(p, x)` returns f and ∂f/∂p, or `None` where p is not allowed.
+///
+/// # Errors
+/// [`FitError::TooFewPoints`] below N points; [`FitError::Degenerate`] if the normal matrix is singular at the
+/// solution or the start is not allowed.
+pub fn levenberg_marquardt<const N: usize>(
+    points: &[(f64, f64, f64)],
+    start: SVector<f64, N>,
+    model: impl Fn(&SVector<f64, N>, f64) -> Option<(f64, SVector<f64, N>)>,
+) -> Result<Solution<N>, FitError> {
+    if points.len() < N {
+        return Err(FitError::TooFewPoints {
+            found: points.len(),
+            needed: N,
+        });
+    }
+    let system = |p: &SVector<f64, N>| {
+        let mut normal = SMatrix::<f64, N, N>::zeros();
+        let mut gradient = SVector::<f64, N>::zeros();
+        let mut chi_square = 0.0;
+        for &(x, y, weight) in points {
+            let (f, slope) = model(p, x)?;
+            normal += weight * slope * slope.transpose();
+            gradient += weight * (y - f) * slope;
+            chi_square += weight * (y - f) * (y - f);
+        }
+        chi_square
+            .is_finite()
+            .then_some((normal, gradient, chi_square))
+    };
+    let (p, (normal, _, chi_square)) = minimise(start, system).ok_or(FitError::Degenerate)?;
     let covariance = normal.try_inverse().ok_or(FitError::Degenerate)?;
     if (0..N).any(|i| !(covariance[(i, i)] > 0.0 && covariance[(i, i)].is_finite())) {
         return Err(FitError::Degenerate);

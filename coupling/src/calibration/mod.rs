@@ -1,5 +1,6 @@
 //! Calibration of μ(I) from averaged profiles of inclined flows.
 
+mod fluidity;
 mod free_form;
 mod friction_map;
 mod laws;
@@ -12,6 +13,7 @@ mod residual_tests;
 mod table;
 pub mod thesis;
 
+pub use fluidity::{FluidityFit, FluidityFlow, FluidityLayer, Foretold, fit_fluidity};
 pub use free_form::{FreeForm, fit_free_form};
 pub use friction_map::{
     Curve, FrictionMap, Interpolated, InterpolationError, MapCell, MapError, Missed, WithError,

@@ -1,6 +1,7 @@
 //! Good enough or not, in words with figures.
 
 use super::CampaignSpec;
+use super::candidates::Candidates;
 use super::causes::{causes, inherited, laws};
 use super::search::NoBracket;
 use super::threshold::{NonLocal, Threshold};
@@ -33,6 +34,7 @@ pub(super) struct Evidence<'a> {
     pub alternatives: &'a [Alternative],
     pub posterior: &'a Option<Posterior>,
     pub points: &'a [LocalPoint],
+    pub candidates: Candidates<'a>,
 }
 
 /// Root-mean-square residual, relative to μ, above which μ(I) does not describe the material.
@@ -57,6 +59,7 @@ pub(super) fn judge(e: &Evidence) -> Verdict {
     }
     laws(e.alternatives, e.points, &mut text);
     causes(e, &mut good, &mut text);
+    e.candidates.tell(&mut text);
     if let Ok(fit) = e.fit_zz {
         text.push(format!(
             "Against sigma_zz instead of p: mu_s = {:.3} ± {:.3}, mu_2 = {:.3} ± {:.3}, I_0 = {:.3} ± {:.3}; \

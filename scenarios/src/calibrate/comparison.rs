@@ -262,6 +262,6 @@ impl<'a> Sides<'a> {
         let discrepancy = Discrepancy::of(&all, law, fit.stress)?;
         let best = self.bulk.gain_by(law, fit.stress, 0.0);
         let quantiles = band(&self.bulk, posterior?, Some(discrepancy), fit.stress, seed)?;
-        (best > 0.0 && best.is_finite()).then(|| quantiles.map(|s| s / best))
+        (best > 0.0 && best.is_finite()).then(|| quantiles.map(|s| (s / best).min(f64::MAX)))
     }
 }

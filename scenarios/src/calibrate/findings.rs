@@ -126,6 +126,19 @@ pub(super) fn summarise(scene: &Scene, record: &Campaign) -> Summary {
             Quantity::new(a.weight, "1").from("Akaike weight of the law"),
         );
     }
+    if let Some(fit) = &result.fluidity {
+        let source = "Akaike weight of non-local fluidity against the local law, on profiles through the depth";
+        summary.put(
+            "weight_non_local",
+            Quantity::new(fit.weight, "1").from(source),
+        );
+        let [low, high] = fit.amplitude_range;
+        let source = format!("non-local amplitude A from profiles; 68 %: {low:.2} to {high:.2}");
+        summary.put(
+            "non_local_amplitude_profiles",
+            Quantity::new(fit.amplitude, "1").from(&source),
+        );
+    }
     for c in &record.comparisons {
         if let Some((difference, [_, within])) = c.against_grains() {
             let fit = match c.friction {

@@ -1,8 +1,10 @@
-//! Legacy VTK files with grains as points: LIGGGHTS' `dump custom/vtk`. ASCII or binary.
+//! Legacy VTK files with grains as points: LIGGGHTS' `dump custom/vtk`. ASCII or binary, of all versions up to 5.1.
 
 use super::{Instant, Row};
+use colluvium_dem::Domain;
 use nalgebra::Vector3;
 use std::collections::HashMap;
+use std::path::Path;
 
 /// Place in a file: by lines and words where it is text, by bytes where it is not.
 struct Cursor<'a> {
@@ -48,7 +50,7 @@ impl<'a> Cursor<'a> {
         }
         let size = match kind {
             "float" | "int" | "unsigned_int" => 4,
-            "double" | "long" | "vtkIdType" => 8,
+            "double" | "long" | "vtkIdType" | "vtktypeint64" => 8,
             "short" => 2,
             "char" | "unsigned_char" => 1,
             other => return Err(format!("numbers of type {other} cannot be read")),
@@ -76,7 +78,8 @@ impl<'a> Cursor<'a> {
     }
 }
 
-pub(super) fn read(bytes: &[u8]) -> Result<Vec<Instant>, String> {
+/// After the two lines of the header; also says whether cells stand as offsets and connectivity, as from version 5 on.
+fn begin(bytes: &[u8]) -> Result<(Cursor<'_>, bool), String> {
     let mut cursor = Cursor {
         bytes,
         at: 0,
@@ -86,12 +89,62 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<Instant>, String> {
     if !head.starts_with("# vtk DataFile") {
         return Err("not a legacy VTK file: `# vtk DataFile` is missing".into());
     }
+    let version = head.split_whitespace().last().unwrap_or_default();
+    let major = version
+        .split('.')
+        .next()
+        .and_then(|n| n.parse::<u32>().ok());
     cursor.line();
     cursor.binary = match cursor.line() {
         Some("ASCII") => false,
         Some("BINARY") => true,
         other => return Err(format!("ASCII or BINARY is expected, not {other:?}")),
     };
+    Ok((cursor, major.is_some_and(|n| n >= 5)))
+}
+
+/// The box that LIGGGHTS writes beside `grains.100.vtk` as `grains.boundingBox_100.vtk`, and the step. Nothing is said there of
+/// its periodic axes.
+pub(super) fn beside(path: &Path) -> (Option<Domain>, Option<f64>) {
+    let name = path.file_name().and_then(|n| n.to_str()).unwrap_or("");
+    let stem = name.strip_suffix(".vtk").unwrap_or(name);
+    let digits = stem.trim_end_matches(|c: char| c.is_ascii_digit()).len();
+    let (head, step) = stem.split_at(digits);
+    let Ok(number) = step.parse::<u64>() else {
+        return (None, None);
+    };
+    let file = path.with_file_name(format!("{head}boundingBox_{step}.vtk"));
+    let found = std::fs::read(file).ok().and_then(|bytes| corners(&bytes));
+    (found, Some(number as f64))
+}
+
+/// The ends of a rectilinear grid.
+fn corners(bytes: &[u8]) -> Option<Domain> {
+    let (mut cursor, _) = begin(bytes).ok()?;
+    let mut ends = [None; 3];
+    while let Some(line) = cursor.line() {
+        let words: Vec<&str> = line.split_whitespace().collect();
+        let axis = match words[0] {
+            "X_COORDINATES" => 0,
+            "Y_COORDINATES" => 1,
+            "Z_COORDINATES" => 2,
+            _ => continue,
+        };
+        let values = cursor
+            .numbers(words.get(1)?.parse().ok()?, words.get(2)?)
+            .ok()?;
+        ends[axis] = Some((*values.first()?, *values.last()?));
+    }
+    let [x, y, z] = [ends[0]?, ends[1]?, ends[2]?];
+    Some(Domain {
+        lower: Vector3::new(x.0, y.0, z.0),
+        upper: Vector3::new(x.1, y.1, z.1),
+        periodic: [false; 3],
+    })
+}
+
+pub(super) fn read(bytes: &[u8]) -> Result<Vec<Instant>, String> {
+    let (mut cursor, offsets) = begin(bytes)?;
     let mut positions = Vec::new();
     let mut fields: HashMap<String, (usize, Vec<f64>)> = HashMap::new();
     let mut over_points = false;
@@ -107,6 +160,14 @@ pub(super) fn read(bytes: &[u8]) -> Result<Vec<Instant>, String> {
                 let n = count_of(&words, 1)?;
                 let kind = words.get(2).copied().unwrap_or("float");
                 positions = cursor.numbers(3 * n, kind)?;
+            }
+            "VERTICES" | "LINES" | "POLYGONS" | "CELLS" if offsets => {
+                for k in [1, 2] {
+                    let n = count_of(&words, k)?;
+                    let line = cursor.line().ok_or("the file ends within cells")?;
+                    let kind = line.split_whitespace().nth(1).unwrap_or("vtktypeint64");
+                    cursor.numbers(n, kind)?;
+                }
             }
             "VERTICES" | "LINES" | "POLYGONS" | "CELLS" => {
                 let n = count_of(&words, 2)?;

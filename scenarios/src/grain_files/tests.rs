@@ -340,3 +340,61 @@ fn torques_of_liggghts_are_in_balance_on_both_sides() {
     assert!(worst[0] < 0.01 * typical, "{worst:?} {typical}");
     assert!(worst[1] > 0.1 * typical, "{worst:?} {typical}");
 }
+
+/// The same bed as LIGGGHTS' `dump custom/vtk` leaves it: VTK 5.1, as text and as bytes, the box in a file beside it. Text has six
+/// digits, bytes have places in single precision.
+#[test]
+fn a_vtk_file_of_liggghts_holds_the_bed_of_its_dump() {
+    use colluvium_coupling::coarse_graining::{Averager, Layering, Lucy};
+    let dump = &settled(LIGGGHTS_COLUMNS).unwrap()[0];
+    let folder = tempfile::tempdir().unwrap();
+    let text: &[u8] = include_bytes!("liggghts/grains.vtk");
+    let bytes: &[u8] = include_bytes!("liggghts/grains_binary.vtk");
+    let bounds = folder.path().join("grains.boundingBox_450001.vtk");
+    std::fs::write(&bounds, include_str!("liggghts/bounding_box.vtk")).unwrap();
+    let path = folder.path().join("grains.450001.vtk");
+    let unsaid = Unsaid {
+        periodic: Some([true, true, false]),
+        timestep: Some(2e-6),
+        ..Unsaid::default()
+    };
+    let solid = |s: &Snapshot| {
+        let layers = Layering {
+            lower: -0.02,
+            thickness: 0.005,
+            count: 30,
+        };
+        let mut averager = Averager::new(Lucy { half_width: 0.01 }, layers).unwrap();
+        averager.sample(s);
+        let rows = averager.profile(0.01, 2500.0).rows;
+        rows.iter().map(|r| r.phi.value).collect::<Vec<f64>>()
+    };
+    for (content, nearness) in [(text, 1e-6), (bytes, 1e-8)] {
+        std::fs::write(&path, content).unwrap();
+        let s = all(&path, &unsaid).unwrap().remove(0);
+        assert_eq!(s.grains.len(), 150);
+        assert!((s.time - 0.900002).abs() < 1e-12);
+        assert_eq!(s.domain, dump.domain);
+        let mut worst = 0.0f64;
+        for g in &s.grains {
+            let same = dump.grains.iter().find(|d| d.id == g.id).unwrap();
+            worst = worst.max(s.domain.nearest_image(g.position - same.position).norm());
+            assert!((g.radius / same.radius - 1.0).abs() < 1e-6);
+            assert!((g.mass / same.mass - 1.0).abs() < 1e-5);
+            assert!((g.velocity - same.velocity).norm() < 0.01 * same.velocity.norm() + 1e-9);
+        }
+        println!("worst distance {worst:.1e} m");
+        assert!(worst < nearness, "{worst}");
+        let off = solid(&s)
+            .into_iter()
+            .zip(solid(dump))
+            .map(|(a, b)| (a - b).abs());
+        assert!(off.fold(0.0, f64::max) < 1e-4);
+    }
+    // Without the file beside it a periodic axis has no length.
+    std::fs::remove_file(&bounds).unwrap();
+    let why = all(&path, &unsaid).unwrap_err().to_string();
+    assert!(why.contains("--box"), "{why}");
+    std::fs::write(&path, &text[..9000]).unwrap();
+    assert!(all(&path, &Unsaid::default()).is_err());
+}

@@ -27,7 +27,18 @@ pub struct MapFile {
     pub cell: Vec<MapCell>,
 }
 
+/// The map that comes with the program: what `rheology.from` reads where it names no map of its own.
+const BUNDLED: &str = include_str!("../../rheologies/map.toml");
+
 impl MapFile {
+    /// The map that comes with the program.
+    pub fn bundled() -> Result<MapFile, SceneError> {
+        toml::from_str(BUNDLED).map_err(|error| SceneError::Rheology {
+            path: "the bundled map".into(),
+            message: error.to_string().trim().to_owned(),
+        })
+    }
+
     /// Reads a file.
     pub fn read(path: &Path) -> Result<MapFile, SceneError> {
         let fail = |message: String| SceneError::Rheology {
@@ -218,8 +229,7 @@ mod tests {
     /// The map in `rheologies/`: sound, and near the campaigns of other beds that are no part of it.
     #[test]
     fn the_measured_map_is_near_campaigns_that_are_no_part_of_it() {
-        let path = Path::new(env!("CARGO_MANIFEST_DIR")).join("rheologies/map.toml");
-        let file = MapFile::read(&path).unwrap();
+        let file = MapFile::bundled().unwrap();
         assert!(file.interpolation_error.friction.iter().all(|e| *e > 0.0));
         for cell in &file.cell {
             assert_eq!(file.rheology(cell.beta, cell.mu_r).unwrap().check(), Ok(()));

@@ -1,6 +1,8 @@
 //! The report of a map.
 
-use super::{Cell, MapFile};
+use super::MapFile;
+use super::cell::Cell;
+use super::curve::HELD;
 use crate::report::page::{figure, number, page, with_error};
 use crate::report::plot::{Mark, Plot};
 use crate::run::PUBLISHED_ANGLES;
@@ -40,7 +42,7 @@ fn measured(cells: &[Cell]) -> Markup {
                 th { "I measured" } th { "φ" } th { "p/σ_zz" } th.text { "determined" } th.text { "report" }
             }
             @for c in cells {
-                @let fit = c.campaign.result.fit.as_ref();
+                @let fit = c.campaign.result.fit.as_ref().filter(|f| f.physical);
                 tr {
                     td { (c.cell.beta) }
                     td { (c.cell.mu_r) }
@@ -52,6 +54,9 @@ fn measured(cells: &[Cell]) -> Markup {
                         td { (with_error(f.i_0, f.i_0_error)) }
                         td { (number(f.rms_residual)) }
                         td { (number(f.valid_i[0])) " … " (number(f.valid_i[1])) }
+                    } @else {
+                        td.text colspan="4" { "no three parameters; the curve has I_0 = " (HELD) }
+                        td { (number(c.cell.valid_i[0])) " … " (number(c.cell.valid_i[1])) }
                     }
                     td { (with_error(c.cell.solid_fraction.value, c.cell.solid_fraction.error)) }
                     td { @if let Some((ratio, _)) = c.campaign.result.pressure_ratio { (number(ratio)) } }

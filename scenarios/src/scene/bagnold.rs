@@ -54,8 +54,9 @@ pub struct MapPlaceKeys {
     /// Rolling friction μ_R of the contact law.
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0))]
     pub mu_r: f64,
-    /// A `map.toml` that `colluvium map` wrote.
-    pub map: String,
+    /// A `map.toml` that `colluvium map` wrote; without it the map that comes with the program.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub map: Option<String>,
 }
 
 /// A material, by numbers, from a file that `calibrate` wrote or from a map.

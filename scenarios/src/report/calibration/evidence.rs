@@ -3,6 +3,7 @@
 use super::super::page::{figure, number, with_error};
 use super::super::plot::{Mark, Plot};
 use super::{Campaign, HEIGHT, WIDTH};
+use colluvium_coupling::calibration::FluidityFit;
 use colluvium_coupling::campaign::Threshold;
 use maud::{Markup, html};
 
@@ -34,6 +35,7 @@ pub(super) fn evidence(campaign: &Campaign) -> Markup {
                 }
             } }
         }
+        @if let Some(fit) = &result.fluidity { (fluidity(fit)) }
         @if let Some(r) = &result.residuals {
             h3 { "Are the residuals noise?" }
             table {
@@ -64,6 +66,47 @@ pub(super) fn evidence(campaign: &Campaign) -> Markup {
                 @if let Some(t) = &result.onset { (threshold("onset", t, campaign.diameter)) }
             }
         }
+    }
+}
+
+/// The local law and one with a length.
+fn fluidity(fit: &FluidityFit) -> Markup {
+    let law =
+        |[mu_s, mu_2, i_0]: [f64; 3]| format!("μ_s = {mu_s:.3}, μ_2 = {mu_2:.3}, I_0 = {i_0:.3}");
+    let length = format!(
+        "{}, A = {:.2} (68 %: {:.2} – {:.2}), g/g_loc at the base = {:.2}",
+        law(fit.law),
+        fit.amplitude,
+        fit.amplitude_range[0],
+        fit.amplitude_range[1],
+        fit.base
+    );
+    let rows = [
+        ("local", law(fit.local), 0, 1.0 - fit.weight),
+        ("non-local fluidity", length, 1, fit.weight),
+    ];
+    html! {
+        h3 { "A length beside the local law?" }
+        p {
+            "ξ²∇²g = g − g_loc with ξ = A d √((μ_2 − μ)/((μ_2 − μ_s)|μ − μ_s|)) (Kamrin and Henann 2015) through the depth of each "
+            "flow, against A = 0, on " (fit.points) " layers of " (fit.flows) " flows: both foretell I from the stress that momentum "
+            "asks. Each flow has a friction of its own; ĉ = " (number(fit.scatter)) ". Of " (fit.left_out.flows) " flows left out of both fits, "
+            (fit.left_out.better) " are foretold better with the length (mean gain " (number(fit.left_out.significance)) " standard errors)."
+        }
+        div.wide { table {
+            tr { th.text { "law" } th.text { "parameters" } th { "rms of ln I" } th { "of flows left out" } th { "χ²" } th { "criterion" } th { "weight" } }
+            @for (name, parameters, k, weight) in rows {
+                tr {
+                    td.text { (name) }
+                    td.text { (parameters) }
+                    td { (format!("{:.4}", fit.rms[k])) }
+                    td { (format!("{:.4}", fit.left_out.rms[k])) }
+                    td { (format!("{:.0}", fit.chi_square[k])) }
+                    td { (format!("{:.1}", fit.criterion[k])) }
+                    td { (format!("{:.1} %", 100.0 * weight)) }
+                }
+            }
+        } }
     }
 }
 

@@ -3,20 +3,22 @@
 //! A step takes the packing, puts it into a simulation with the law, the walls and the pull that it needs,
 //! and takes it back. It has a time step of its own, from its own speeds.
 
+mod clumps;
+
 use super::fragments;
 use crate::failure::Failure;
 use crate::journal::Journal;
 use crate::scene::world::Materials;
 use crate::summary::Note;
 use colluvium_dem::preparation::{
-    Aggregate, Amount, CentralCompaction, ClumpPouring, ClumpShape, Insertion, Jamming, Packing,
-    PackingReport, Pouring, Relaxation, RestMeasures, Scattering, Stages, TRIES, compact, grow,
-    insert_loose, jam, pour, pour_clumps, relax, scatter, settle_in_stages,
+    Aggregate, Amount, CentralCompaction, Insertion, Jamming, Packing, PackingReport, Pouring,
+    Relaxation, RestMeasures, Stages, TRIES, compact, grow, insert_loose, jam, pour, relax,
+    settle_in_stages,
 };
 use colluvium_dem::timestep::{Conditions, Shares};
 use colluvium_dem::{
-    BoxMotion, Domain, Edge, Grain, Laws, Mindlin, Normal, Pose, Region, Setup, SetupError,
-    Simulation, Tangential, TangentialSpring, Threads, Wall,
+    BoxMotion, Domain, Edge, Grain, Laws, Mindlin, Normal, Region, Setup, SetupError, Simulation,
+    Tangential, TangentialSpring, Threads, Wall,
 };
 use nalgebra::{UnitQuaternion, Vector3};
 use std::ops::ControlFlow;
@@ -263,62 +265,6 @@ impl<'a> Workshop<'a> {
         let (grains, report) = insert_loose(&spec, &self.packing.grains).map_err(refused)?;
         self.packing.grains.extend(grains);
         self.note("insert", report);
-        Ok(())
-    }
-
-    /// Inserts clumps of a shape among what is there.
-    pub fn insert_clumps(
-        &mut self,
-        shape: ClumpShape,
-        (region, count): (Region, usize),
-        velocity: Vector3<f64>,
-    ) -> Result<(), Failure> {
-        let balls = shape.balls.len();
-        let spec = Scattering {
-            shape,
-            region,
-            domain: self.packing.domain,
-            count,
-            velocity,
-            seed: self.seed,
-        };
-        let among = &self.packing.grains;
-        let put = scatter(&spec, among, among.len() as u32).map_err(refused)?;
-        self.packing.grains.extend(put.grains);
-        self.packing.clumps.extend(put.clumps);
-        self.note("insert", format!("{count} clumps of {balls} balls"));
-        Ok(())
-    }
-
-    /// Pours clumps of a shape from a source until they rest.
-    pub fn pour_clumps(
-        &mut self,
-        around: &Surroundings,
-        (shape, source, count): (ClumpShape, Region, usize),
-        (velocity, interval): (Vector3<f64>, Option<f64>),
-        relaxation: &Relaxation,
-    ) -> Result<(), Failure> {
-        self.coming = shape.grains(&Pose::at(Vector3::zeros()), velocity);
-        let spec = ClumpPouring {
-            source,
-            shape,
-            count,
-            velocity,
-            interval,
-            fill: colluvium_dem::preparation::FILL,
-            seed: self.seed,
-        };
-        let mut simulation = self.simulation(around)?;
-        let report = pour_clumps(&mut simulation, &spec, relaxation, self.watch).map_err(ended)?;
-        self.take(simulation);
-        let balls = self.coming.drain(..).count();
-        self.note(
-            "pour",
-            format!(
-                "{count} clumps of {balls} balls poured in {} batches, {:.3e} s apart; {}",
-                report.batches, report.interval, report.rest
-            ),
-        );
         Ok(())
     }
 
