@@ -21,16 +21,10 @@ impl Simulation {
     /// If a number is out of its range, or a periodic box too narrow for a new grain. Nothing has
     /// changed then.
     pub fn insert(&mut self, grains: &[Grain]) -> Result<Range<u32>, SetupError> {
-        let largest = check_grains(grains, self.law.materials())?;
-        let present = self.grains.place[..self.grains.len()].iter();
-        let (small, large) = present.fold((f64::INFINITY, largest), |(small, large), x| {
-            (small.min(x[3]), large.max(x[3]))
-        });
-        let small = grains.iter().fold(small, |small, g| small.min(g.radius));
+        let [small, large] = self.admit(grains)?;
         if grains.is_empty() {
             return Ok(self.next_id..self.next_id);
         }
-        self.check_box(large, small)?;
         let end = u32::try_from(grains.len())
             .ok()
             .and_then(|count| self.next_id.checked_add(count))
@@ -45,17 +39,39 @@ impl Simulation {
         self.grains.append(grains, ids.start);
         self.next_id = end;
         self.rebuild();
-        let new = |id: &u32| ids.contains(id);
-        let places = self.grains.id.iter().enumerate();
-        let places: Vec<usize> = places.filter(|(_, id)| new(id)).map(|(i, _)| i).collect();
         if self.steps_since_start > 0 {
-            self.take_back(&places);
+            let new = self.places_of(|id| ids.contains(&id));
+            self.take_back(&new);
         }
-        for i in places {
+        self.seat(|id| ids.contains(&id));
+        Ok(ids)
+    }
+
+    /// Checks grains that are to come; the smallest and the largest radius with them (m).
+    pub(crate) fn admit(&self, grains: &[Grain]) -> Result<[f64; 2], SetupError> {
+        let largest = check_grains(grains, self.law.materials())?;
+        let present = self.grains.place[..self.grains.len()].iter();
+        let (small, large) = present.fold((f64::INFINITY, largest), |(small, large), x| {
+            (small.min(x[3]), large.max(x[3]))
+        });
+        let small = grains.iter().fold(small, |small, g| small.min(g.radius));
+        if !grains.is_empty() {
+            self.check_box(large, small)?;
+        }
+        Ok([small, large])
+    }
+
+    fn places_of(&self, new: impl Fn(u32) -> bool) -> Vec<usize> {
+        let places = self.grains.id.iter().enumerate();
+        places.filter(|(_, id)| new(**id)).map(|(i, _)| i).collect()
+    }
+
+    /// Books new grains.
+    pub(crate) fn seat(&mut self, new: impl Fn(u32) -> bool) {
+        for i in self.places_of(new) {
             self.account += self.held_momentum(i);
         }
         self.population_changed();
-        Ok(ids)
     }
 
     /// Takes out all grains for which `f` says so, with all others of their clumps, and says how many.

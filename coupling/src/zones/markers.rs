@@ -90,6 +90,18 @@ impl Markers {
         }
     }
 
+    /// The farthest x (m) at the start behind which no material has moved by more than a length (m).
+    pub fn still(&self, length: f64) -> f64 {
+        let moved = |m: &&Marker| {
+            let way = [0, 1].map(|a| m.place[a] - m.start[a]);
+            way[0].hypot(way[1]) > length
+        };
+        let first = self.list.iter().filter(moved).map(|m| m.start[0]);
+        let first = first.fold(f64::INFINITY, f64::min);
+        let behind = self.list.iter().map(|m| m.start[0]);
+        behind.filter(|x| *x < first).fold(0.0, f64::max)
+    }
+
     /// Volume that has misplaced more strain than a tolerance, by the concern that took the largest part (m²).
     pub fn needy(&self, tolerance: f64) -> [f64; 4] {
         let mut volumes = [0.0; 4];
@@ -247,6 +259,21 @@ mod tests {
             assert!(miss < 0.006, "{m:?}");
             assert_eq!(m.total(), 0.0);
         }
+    }
+
+    #[test]
+    fn what_has_not_moved_ends_where_something_has() {
+        let mut markers = Markers::new(&fields(0.0, 0.0, 100.0));
+        assert!((markers.still(0.01) - 1.95).abs() < 1e-12);
+        for m in markers.list.iter_mut().filter(|m| m.start[0] > 1.2) {
+            m.place[1] -= 0.02;
+        }
+        assert!((markers.still(0.01) - 1.15).abs() < 1e-12);
+        assert!((markers.still(0.03) - 1.95).abs() < 1e-12);
+        for m in &mut markers.list {
+            m.place[0] += 0.1;
+        }
+        assert_eq!(markers.still(0.01), 0.0);
     }
 
     #[test]

@@ -164,6 +164,7 @@ impl<'a> JoinedColumn<'a> {
     /// What the column is joined from, at a solid fraction.
     fn spec(&self, solid_fraction: f64) -> Result<MaterialEdgeSpec, Failure> {
         let scene = self.scene;
+        let settings = scene.overlap_settings(&self.origin)?;
         Ok(MaterialEdgeSpec {
             case: CollapseCase {
                 aspect: scene.aspect,
@@ -172,12 +173,14 @@ impl<'a> JoinedColumn<'a> {
                 rheology: self.law(solid_fraction)?,
                 cells: scene.cells(),
                 length_scaled: scene.grid.length_scaled,
-                overhang_degrees: 0.0,
+                overhang_degrees: scene.overhang_degrees,
             },
             options: super::collapse::options(scene),
             place: scene.edge(),
+            wall: scene.rest(),
             slab: scene.slab(),
-            settings: scene.overlap_settings(&self.origin)?,
+            travel: scene.travel(&settings),
+            settings,
         })
     }
 
@@ -288,8 +291,12 @@ impl<'a> JoinedColumn<'a> {
 
 impl Recipe for JoinedColumn<'_> {
     fn about(&self) -> String {
+        let rest = match self.scene.rest() {
+            0.0 => String::new(),
+            rest => format!(", of which {rest:.4} m rest and are not computed"),
+        };
         format!(
-            "{}; what lies within {:.4} m of the wall is a continuum",
+            "{}; what lies within {:.4} m of the wall is a continuum{rest}",
             self.scene.about(),
             self.scene.edge()
         )
@@ -353,7 +360,7 @@ impl Recipe for JoinedColumn<'_> {
         own.extend([
             "granular temperature and dilatancy of the continuum",
             "spins across the edge",
-            "exchange of mass through the edge (it moves with the material)",
+            "exchange of mass through the edge but by whole strips (it moves with the material)",
         ]);
         own
     }
@@ -407,6 +414,7 @@ impl Recipe for JoinedColumn<'_> {
             ("continuum_kinetic", "J"),
             ("edge_foot", "m"),
             ("edge_top", "m"),
+            ("edge_label", "m"),
         ]
         .map(|(name, unit)| (name.to_owned(), unit))
         .to_vec()
@@ -419,7 +427,7 @@ impl Recipe for JoinedColumn<'_> {
             *guard = self.recalled(simulation, state).ok();
         }
         let Some(live) = guard.as_ref() else {
-            return vec![f64::NAN; 5];
+            return vec![f64::NAN; 6];
         };
         let last = live.course.fronts.last();
         let [_, front, height] = last.copied().unwrap_or([f64::NAN; 3]);
@@ -431,6 +439,7 @@ impl Recipe for JoinedColumn<'_> {
             live.edge.continuum_kinetic(),
             end(places.first()),
             end(places.last()),
+            self.scene.edge() + live.edge.travelled(),
         ]
     }
 

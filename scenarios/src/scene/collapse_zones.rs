@@ -2,27 +2,77 @@
 
 use super::world::Place;
 use super::{CollapseScene, SceneError};
+use colluvium_coupling::overlap::material_edge::Travel;
 use colluvium_coupling::overlap::{NormalMotion, OverlapError, OverlapSettings, Resolved, Scales};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
 /// Where there are grains.
-#[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ColumnZoneKeys {
     /// Distance over the column's height at which grains begin, from the wall; what is left out is computed.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 50.0))]
     pub edge_scaled: Option<f64>,
+    /// Distance over the column's height, from the wall, within which the material is not computed: it rests behind a
+    /// smooth wall. Left out, it is computed; 0 computes all.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minimum" = 0.0, "maximum" = 50.0))]
+    pub rest_scaled: Option<f64>,
+    /// The edge moves: what has come to rest beside it becomes continuum, and what begins to move behind it becomes
+    /// grains again.
+    #[serde(default)]
+    pub moving: bool,
+    /// Rms speed over √(gravity diameter) below which grains beside a moving edge rest.
+    #[serde(default = "rests")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0))]
+    pub rest_speed_scaled: f64,
+    /// The same above which the continuum behind a moving edge moves; above rest_speed_scaled.
+    #[serde(default = "wakes")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0))]
+    pub wake_speed_scaled: f64,
+    /// Rest over √(height/gravity) after which grains become continuum; every return doubles it.
+    #[serde(default = "holds")]
+    #[schemars(extend("minimum" = 0.0, "maximum" = 1000.0))]
+    pub hold_scaled: f64,
     /// The edge by the oracle instead: a run of the continuum alone comes first, and material that makes more strain
     /// than this under a friction in doubt is grains.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 100.0))]
     pub tolerance: Option<f64>,
-    /// Most grains that the oracle may leave; where it needs more, the tolerance is raised, and the plan says so.
+    /// Most grains, with zones.tolerance or zones.moving. Where the oracle needs more, the tolerance is raised, and the
+    /// plan says so; an edge that moves does not move where that would make more.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 1, "maximum" = 1.0e9))]
     pub budget: Option<u64>,
+}
+
+impl Default for ColumnZoneKeys {
+    fn default() -> Self {
+        Self {
+            edge_scaled: None,
+            rest_scaled: None,
+            moving: false,
+            rest_speed_scaled: rests(),
+            wake_speed_scaled: wakes(),
+            hold_scaled: holds(),
+            tolerance: None,
+            budget: None,
+        }
+    }
+}
+
+fn rests() -> f64 {
+    0.06
+}
+
+fn wakes() -> f64 {
+    0.3
+}
+
+fn holds() -> f64 {
+    0.2
 }
 
 /// The overlap of both, from the edge into the grains. What is left out is computed; `colluvium plan` says it.
@@ -100,6 +150,10 @@ pub const DENSE: f64 = 0.57;
 /// Column heights in front of the foot's end that begin to flow: a collapse fails along a plane from there, which
 /// in grains of friction 0.5 to 0.6 is 55 to 60 degrees steep, and its surface eats its way back beyond that.
 const FLOWS: f64 = 0.8;
+/// Column heights behind the edge of which the continuum is computed, if nobody says how many.
+const BEHIND: f64 = 1.5;
+/// Fewest grains beyond the overlap of an edge that moves.
+const FEWEST_GRAINS: f64 = 50.0;
 /// Fewest diameters of continuum behind the edge, and of grains in front of the overlap.
 const LEAST_CONTINUUM: f64 = 3.0;
 const LEAST_GRAINS: f64 = 4.0;
@@ -116,6 +170,27 @@ impl CollapseScene {
                 self.width() - (FLOWS * self.height).max(overlap + LEAST_GRAINS * d)
             }
         }
+    }
+
+    /// How far from the wall the material rests (m), given or computed.
+    pub fn rest(&self) -> f64 {
+        match self.zones.rest_scaled {
+            Some(scaled) => scaled * self.height,
+            None => (self.edge() - BEHIND * self.height).max(0.0),
+        }
+    }
+
+    /// When the edge moves on to other material, for an overlap with these settings.
+    pub fn travel(&self, settings: &Resolved) -> Option<Travel> {
+        let unit = (self.gravity * self.grains.diameter).sqrt();
+        self.zones.moving.then(|| Travel {
+            width: settings.buffer,
+            rest: self.zones.rest_speed_scaled * unit,
+            wake: self.zones.wake_speed_scaled * unit,
+            hold: self.zones.hold_scaled * (self.height / self.gravity).sqrt(),
+            budget: self.zones.budget.map_or(f64::INFINITY, |most| most as f64),
+            fewest: FEWEST_GRAINS,
+        })
     }
 
     /// The overlap's settings with nothing left out.
@@ -175,10 +250,6 @@ impl CollapseScene {
     pub(super) fn check_zones(&self, origin: &str) -> Result<(), SceneError> {
         self.check_grains(origin)?;
         let at = |section| Place { origin, section };
-        if self.overhang_degrees != 0.0 {
-            let range = "0 with model = \"hybrid\": the column's face stands upright";
-            return Err(at("").refuse("overhang_degrees", self.overhang_degrees, range));
-        }
         let settings = self.overlap_settings(origin)?;
         let (d, h) = (self.grains.diameter, self.height);
         let overlap = settings.inner + settings.buffer;
@@ -195,16 +266,30 @@ impl CollapseScene {
             return Err(at("").refuse("aspect", self.aspect, &range));
         }
         let zones = &self.zones;
-        if zones.budget.is_some() && zones.tolerance.is_none() {
-            let range = "a budget of the oracle, whose zones.tolerance is to be given with it";
+        if zones.budget.is_some() && zones.tolerance.is_none() && !zones.moving {
+            let range = "given with zones.tolerance or zones.moving = true: an edge that is given and stays has no other number of grains";
             return Err(at("zones").refuse("budget", zones.budget.unwrap_or(0), range));
         }
         if let (Some(_), Some(edge)) = (zones.tolerance, zones.edge_scaled) {
             let range = "left out where zones.tolerance is given: the oracle puts the edge";
             return Err(at("zones").refuse("edge_scaled", edge, range));
         }
+        if zones.wake_speed_scaled <= zones.rest_speed_scaled {
+            let range = format!(
+                "above zones.rest_speed_scaled = {}",
+                zones.rest_speed_scaled
+            );
+            return Err(at("zones").refuse("wake_speed_scaled", zones.wake_speed_scaled, range));
+        }
         if zones.tolerance.is_some() {
-            return Ok(());
+            return match zones.rest_scaled {
+                None => Ok(()),
+                Some(rest) => {
+                    let range =
+                        "left out where zones.tolerance is given: the oracle says what rests";
+                    Err(at("zones").refuse("rest_scaled", rest, range))
+                }
+            };
         }
         let edge = self.edge() / h;
         if !(least..=most * (1.0 + 1e-12)).contains(&edge) {
@@ -217,6 +302,11 @@ impl CollapseScene {
                     format!("{range}: a column of smaller aspect, or an edge of your own"),
                 )),
             };
+        }
+        let (rest, most) = (self.rest() / h, edge - least);
+        if rest > most {
+            let range = format!("[0, {most:.4}]: some continuum lies behind the edge");
+            return Err(at("zones").refuse("rest_scaled", rest, range));
         }
         Ok(())
     }

@@ -25,12 +25,14 @@ pub struct Account {
     pub untaken: [f64; 2],
     /// Weight of the continuum, copy included.
     pub continuum_weight: [f64; 2],
+    /// That of grains which came when the edge moved, less that of those which went.
+    pub handed: [f64; 2],
     /// Volume that the copy was given when it was made anew, in the continuum's own unit.
     pub copied: f64,
 }
 
 /// Numbers of an account.
-pub const NUMBERS: usize = 22;
+pub const NUMBERS: usize = 24;
 
 impl Account {
     /// All of it in a row of numbers.
@@ -42,7 +44,7 @@ impl Account {
         })
     }
 
-    fn rows(&self) -> [[f64; 2]; 10] {
+    fn rows(&self) -> [[f64; 2]; 11] {
         [
             self.grains_before,
             self.continuum_before,
@@ -54,6 +56,7 @@ impl Account {
             self.following,
             self.untaken,
             self.continuum_weight,
+            self.handed,
         ]
     }
 
@@ -73,6 +76,7 @@ impl Account {
             following: row(7),
             untaken: row(8),
             continuum_weight: row(9),
+            handed: row(10),
         }
     }
 
@@ -85,6 +89,7 @@ impl Account {
                 self.traction[axis],
                 self.impedance[axis],
                 self.relaxation[axis],
+                self.handed[axis],
             ];
             let change = now[axis] - self.grains_before[axis];
             let all = entries
@@ -144,6 +149,8 @@ pub struct Monitors {
     pub impulse: [f64; 2],
     /// Most grains beyond the edge by more than a diameter.
     pub escaped: f64,
+    /// Grains times their steps.
+    pub grain_steps: f64,
     /// Steps of the continuum, and active cells in them.
     pub steps: [f64; 2],
     /// Largest residual of the continuum's momentum.
@@ -151,7 +158,7 @@ pub struct Monitors {
 }
 
 /// Numbers of the monitors.
-pub const MONITORED: usize = 12;
+pub const MONITORED: usize = 13;
 
 impl Monitors {
     /// All of it in a row of numbers.
@@ -169,6 +176,7 @@ impl Monitors {
             self.steps[0],
             self.steps[1],
             self.residual,
+            self.grain_steps,
         ]
     }
 
@@ -184,6 +192,7 @@ impl Monitors {
             escaped: n[8],
             steps: [n[9], n[10]],
             residual: n[11],
+            grain_steps: n[12],
         }
     }
 

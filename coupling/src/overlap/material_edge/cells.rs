@@ -14,6 +14,8 @@ use colluvium_dem::{GrainSample, Partner, Snapshot};
 pub struct Cells {
     /// How many along x and z.
     pub counts: [usize; 2],
+    /// Where the first ones begin along x (m); the floor is at z = 0.
+    pub low: f64,
     /// Edge of a cell (m).
     pub spacing: f64,
     /// Width of the slab across (m).
@@ -46,8 +48,26 @@ impl Cells {
         [(k[0], t[0]), (k[1], t[1])]
     }
 
+    /// Lower face of the cells of a column (m).
+    pub fn face(&self, column: usize) -> f64 {
+        self.low + column as f64 * self.spacing
+    }
+
+    /// Centre of the cells of a column (m).
+    pub fn centre(&self, column: usize) -> f64 {
+        self.low + (column as f64 + 0.5) * self.spacing
+    }
+
+    /// Cells between the centres of the first ones and a place along x.
+    pub fn offset(&self, x: f64) -> f64 {
+        (x - self.low) / self.spacing - 0.5
+    }
+
     fn along(&self, axis: usize, at: f64) -> ([usize; 2], [f64; 2]) {
-        let place = at / self.spacing - 0.5;
+        let place = match axis {
+            0 => self.offset(at),
+            _ => at / self.spacing - 0.5,
+        };
         let low = place.floor();
         let share = place - low;
         let last = self.counts[axis] as i64 - 1;
@@ -200,6 +220,7 @@ mod tests {
 
     const CELLS: Cells = Cells {
         counts: [5, 4],
+        low: 0.0,
         spacing: 0.5,
         slab: 2.0,
     };

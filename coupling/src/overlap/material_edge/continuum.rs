@@ -69,7 +69,7 @@ impl View {
     /// neither is full.
     pub fn across(&self, cells: &Cells, x: f64, row: usize) -> Option<(f64, [f64; 3], [f64; 2])> {
         let columns = cells.counts[0];
-        let place = x / cells.spacing - 0.5;
+        let place = cells.offset(x);
         let low = place.floor();
         let share = place - low;
         let index = |n: i64| (low as i64 + n).clamp(0, columns as i64 - 1) as usize + columns * row;

@@ -21,13 +21,12 @@ impl MaterialEdge {
     pub(super) fn copy_the_grains(&mut self, dt: f64) -> Result<(), super::OverlapError> {
         let before = (self.collapse.flow().volume(), self.continuum_momentum());
         let [columns, rows] = self.cells.counts;
-        let h = self.cells.spacing;
         let mut state = self.collapse.flow().state().clone();
         let full = self.spec.density() * self.cells.volume();
         let unit = self.collapse.units().velocity;
         let is_copy = |cell: usize| {
             let (i, k) = (cell % columns, cell / columns);
-            i as f64 * h >= self.held.handshake[k]
+            self.cells.face(i) >= self.held.handshake[k]
         };
         for i in 0..columns {
             let column = (0..rows).map(|k| self.sums.cover[i + columns * k].mass);

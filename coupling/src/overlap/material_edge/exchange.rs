@@ -2,7 +2,7 @@
 
 use super::cells::over;
 use super::rows::{Load, Row, bearers, displacements, slopes};
-use super::{MaterialEdge, OverlapError, label_of};
+use super::{MaterialEdge, OverlapError};
 use colluvium_dem::{GrainSample, Simulation};
 
 /// Cells with less of the mass of a full one are not spoken for by their grains.
@@ -20,7 +20,7 @@ const BAND: f64 = 1.0;
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     near: Vec<(GrainSample, f64)>,
-    shell: Vec<Load>,
+    pub(super) shell: Vec<Load>,
     bearers: Vec<usize>,
     forces: Vec<[f64; 2]>,
     loads: Vec<colluvium_dem::Load>,
@@ -39,12 +39,14 @@ impl MaterialEdge {
             self.exchange(simulation)?;
             self.made = 0;
             self.exchanges += 1;
+            self.travel(simulation)?;
         }
         self.lay(simulation)
     }
 
     /// Books the impulses of what was laid over the steps made since.
     fn book_grains(&mut self, simulation: &Simulation) {
+        self.monitors.grain_steps += simulation.grain_count() as f64 * self.steps_of_loads as f64;
         let time = self.kick + (self.steps_of_loads - 1) as f64 * self.timestep;
         for (sum, force) in self.given.relaxation.iter_mut().zip(&self.laid.relaxation) {
             for (sum, force) in sum.iter_mut().zip(force) {
@@ -76,7 +78,7 @@ impl MaterialEdge {
         scratch.near.extend(
             simulation
                 .held(|x| x.x < reach)
-                .filter_map(|g| label_of(&self.labels, &g).map(|label| (g, label)))
+                .filter_map(|g| self.labels.of(&g).map(|label| (g, label)))
                 .filter(|(_, label)| *label < buffer),
         );
         // Rows may stand in another order after a restart, and sums over them end in other bits.
@@ -92,11 +94,14 @@ impl MaterialEdge {
             if q <= 0.0 {
                 continue;
             }
+            let hats = self.cells.hats(grain.position.x, grain.position.z);
+            let beside = self.view.velocity_at(&hats);
             for (row, hat) in self.cells.rows(grain.position.z) {
+                let [u, w] = beside.unwrap_or(self.held.rows[row].velocity);
                 let load = &mut scratch.shell[row];
                 load.weight += q * hat;
-                load.momentum[0] += q * hat * grain.velocity.x;
-                load.momentum[1] += q * hat * grain.velocity.z;
+                load.slip[0] += q * hat * (grain.velocity.x - u);
+                load.slip[1] += q * hat * (grain.velocity.z - w);
             }
         }
         let full = 0.5 * self.spec.density() * shell * self.cells.spacing * self.spec.slab;
@@ -110,8 +115,8 @@ impl MaterialEdge {
                 continue;
             }
             let load = &scratch.shell[bearer];
-            let mean = load.momentum.map(|p| over(p, load.weight));
-            let impedance = row.impedance(self.spec.settings.impedance, mean);
+            let slip = load.slip.map(|p| over(p, load.weight));
+            let impedance = row.impedance(self.spec.settings.impedance, slip);
             for (axis, (traction, impedance)) in row.traction.iter().zip(impedance).enumerate() {
                 scratch.forces[bearer][axis] += traction + impedance;
                 self.laid.traction[axis] += traction;
@@ -179,11 +184,18 @@ impl MaterialEdge {
 
     /// Sums of the grains over the cells, stresses taken into their averages with this weight.
     pub(super) fn sum_up(&mut self, weight: f64) {
-        let snapshot = &self.sighting.snapshot;
+        self.see_grains();
+        self.sums
+            .press(&self.cells, &self.sighting.snapshot, weight);
+    }
+
+    /// Masses, labels and velocities of the grains over the cells.
+    pub(super) fn see_grains(&mut self) {
         let (labels, inner) = (&self.labels, self.spec.zones()[1]);
         self.sums
-            .cover(&self.cells, snapshot, inner, |g| label_of(labels, g));
-        self.sums.press(&self.cells, snapshot, weight);
+            .cover(&self.cells, &self.sighting.snapshot, inner, |g| {
+                labels.of(g)
+            });
     }
 
     /// Mass of a cell full of continuum (kg).
@@ -273,7 +285,7 @@ impl MaterialEdge {
             (cover.inner, cover.inner_slip) = (0.0, [0.0; 2]);
         }
         for grain in &self.sighting.snapshot.grains {
-            let Some(label) = label_of(&self.labels, grain).filter(|label| *label < inner) else {
+            let Some(label) = self.labels.of(grain).filter(|label| *label < inner) else {
                 continue;
             };
             let hats = self.cells.hats(grain.position.x, grain.position.z);
@@ -322,7 +334,7 @@ impl MaterialEdge {
         let near = snapshot
             .grains
             .iter()
-            .filter(|g| label_of(&self.labels, g).is_some_and(|label| label < buffer));
+            .filter(|g| self.labels.of(g).is_some_and(|label| label < buffer));
         self.held.reach = near.fold(0.0, |most: f64, g| most.max(g.position.x)) + d;
         let places = self.surface_of(0.5 * self.spec.settings.shell);
         let slopes = slopes(&places, &self.cells);
@@ -351,11 +363,12 @@ impl MaterialEdge {
         let band = BAND * self.spec.case.rheology.diameter;
         let mut sums = vec![[0.0; 2]; self.cells.counts[1]];
         for grain in &self.sighting.snapshot.grains {
-            let Some(own) = label_of(&self.labels, grain) else {
+            let Some(own) = self.labels.of(grain) else {
                 continue;
             };
             if (own - label).abs() < band {
-                let moved = grain.position.x - self.spec.place - own;
+                let base = self.labels.base_at(&self.cells, grain.position.z);
+                let moved = grain.position.x - base - own;
                 for (row, hat) in self.cells.rows(grain.position.z) {
                     sums[row][0] += grain.mass * hat;
                     sums[row][1] += grain.mass * hat * moved;
@@ -363,10 +376,10 @@ impl MaterialEdge {
             }
         }
         let least = LEAST_ROW * self.spec.density() * band * self.cells.spacing * self.spec.slab;
-        let start = self.spec.place + label;
-        displacements(&sums, least)
-            .into_iter()
-            .map(|moved| start + moved)
+        let moved = displacements(&sums, least).into_iter();
+        moved
+            .zip(&self.labels.base)
+            .map(|(moved, base)| base + label + moved)
             .collect()
     }
 }

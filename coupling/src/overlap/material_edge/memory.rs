@@ -5,8 +5,9 @@
 
 use super::account::{self, Account, Monitors};
 use super::rows::{self, Row};
+use super::travel::{Journey, Move};
 use super::{MaterialEdge, MaterialEdgeSpec, OverlapError, continuum};
-use colluvium_dem::Simulation;
+use colluvium_dem::{Patch, Simulation};
 
 /// Numbers in front but for the two rows of forces by cell, the account among them.
 const FRONT: usize = 11 + account::NUMBERS;
@@ -39,9 +40,29 @@ impl MaterialEdge {
             memory.push(row.len() as f64);
             memory.extend(row);
         };
-        put(&[self.exchanges as f64, self.continuum_mass, self.held.reach]);
+        put(&[
+            self.exchanges as f64,
+            self.continuum_mass,
+            self.rest_mass,
+            self.held.reach,
+        ]);
         put(&self.monitors.numbers());
-        put(&self.labels);
+        put(&self.labels.given);
+        put(&self.labels.base);
+        let journey = &self.journey;
+        put(&[
+            self.labels.edge,
+            journey.resting,
+            journey.returns,
+            journey.refused,
+            journey.displaced,
+            journey.strips.len() as f64,
+        ]);
+        let moves: Vec<f64> = journey.moves.iter().flat_map(Move::numbers).collect();
+        put(&moves);
+        for strip in &journey.strips {
+            put(&strip.numbers());
+        }
         put(self.sums.stress.as_flattened());
         put(self.held.accelerations.as_flattened());
         let rows: Vec<f64> = self.held.rows.iter().flat_map(Row::numbers).collect();
@@ -81,8 +102,8 @@ impl MaterialEdge {
             rest = after;
             Some(row)
         };
-        let Some(([exchanges, mass, reach], monitors)) = take()
-            .and_then(|row| <[f64; 3]>::try_from(row).ok())
+        let Some(([exchanges, mass, rest_mass, reach], monitors)) = take()
+            .and_then(|row| <[f64; 4]>::try_from(row).ok())
             .zip(take().and_then(|row| row.try_into().ok()))
         else {
             return Ok(None);
@@ -90,7 +111,33 @@ impl MaterialEdge {
         let Some(labels) = take() else {
             return Ok(None);
         };
-        let mut edge = Self::around(spec, mass, labels.to_vec(), simulation)?;
+        let mut edge = Self::around(spec, [mass, rest_mass], labels.to_vec(), simulation)?;
+        let Some(base) = take() else {
+            return Ok(None);
+        };
+        let Some(&[at, resting, returns, refused, displaced, strips]) = take() else {
+            return Ok(None);
+        };
+        let Some(moves) = take() else {
+            return Ok(None);
+        };
+        let strips = (0..strips as usize).map(|_| Patch::of(take()?));
+        let Some(strips) = strips.collect() else {
+            return Ok(None);
+        };
+        if base.len() != edge.labels.base.len() {
+            return Ok(None);
+        }
+        edge.labels.base = base.to_vec();
+        edge.labels.edge = at;
+        edge.journey = Journey {
+            strips,
+            moves: moves.as_chunks().0.iter().map(Move::of).collect(),
+            resting,
+            returns,
+            refused,
+            displaced,
+        };
         let Some([stress, accelerations, edge_rows, handshake, owed]) =
             (|| Some([take()?, take()?, take()?, take()?, take()?]))()
         else {

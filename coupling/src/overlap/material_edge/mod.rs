@@ -14,7 +14,8 @@
 //! - *on both, equal and opposite*: mean velocities of the buffer relax to each other, along x and z.
 //!
 //! The continuum is what is missing of the column's mass, at the solid fraction of its grains. Spins are not
-//! coupled.
+//! coupled. What lies far behind the edge and never moves need not be computed: the continuum may begin at a smooth
+//! wall x = x_w, behind which material *rests* as it stood.
 
 mod account;
 mod cells;
@@ -22,12 +23,16 @@ mod continuum;
 mod copy;
 mod exchange;
 mod memory;
+#[cfg(test)]
+mod rotation;
 mod rows;
 mod totals;
+mod travel;
 mod watch;
 
 pub use account::{Account, Monitors};
 pub use cells::Cells;
+pub use travel::{Move, Travel};
 
 use super::OverlapError;
 use super::settings::Resolved;
@@ -38,9 +43,12 @@ use colluvium_continuum::free_surface::{Outside, SurfaceOptions};
 use colluvium_dem::{GrainSample, Simulation};
 use continuum::View;
 use rows::Row;
+use travel::Journey;
 
 /// Stands for the label of what has none.
 const NO_LABEL: f64 = f64::MAX;
+/// Fewest cells of continuum behind the edge.
+const LEAST_CELLS: f64 = 3.0;
 
 /// What a column is joined from (SI).
 #[derive(Clone, Copy, Debug)]
@@ -51,10 +59,14 @@ pub struct MaterialEdgeSpec {
     pub options: SurfaceOptions,
     /// Where the edge is at the start, x_b (m).
     pub place: f64,
+    /// Where the continuum begins, x_w (m); what lies behind rests.
+    pub wall: f64,
     /// Width of the slab across (m).
     pub slab: f64,
     /// Widths, times and the impedance.
     pub settings: Resolved,
+    /// When the edge moves on to other material, if it does.
+    pub travel: Option<Travel>,
 }
 
 impl MaterialEdgeSpec {
@@ -74,17 +86,45 @@ impl MaterialEdgeSpec {
         self.case.length_scaled * self.case.height / self.case.cells as f64
     }
 
-    /// The column of the continuum that has a mass (kg), from the wall to x_a.
+    /// The column of the continuum that has a mass (kg), from x_w to x_a.
     fn column(&self, mass: f64) -> CollapseCase {
-        let width = self.place + self.zones()[1];
+        let width = self.place + self.zones()[1] - self.wall;
         let height = mass / (self.density() * self.slab * width);
+        let spared = (self.wall / self.spacing()).floor().max(0.0) as usize;
+        let cells = self.case.cells.saturating_sub(spared).max(1);
         CollapseCase {
             aspect: height / width,
             height,
-            length_scaled: self.spacing() * self.case.cells as f64 / height,
+            cells,
+            length_scaled: self.spacing() * cells as f64 / height,
             overhang_degrees: 0.0,
             ..self.case
         }
+    }
+}
+
+/// Labels of grains: distances from the edge along x when they were given, at the start or when the edge moved on.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Labels {
+    /// By grain number; [`NO_LABEL`] for what has none (m).
+    given: Vec<f64>,
+    /// Where the edge was then, row by row (m).
+    base: Vec<f64>,
+    /// How far it has moved on since the start (m).
+    edge: f64,
+}
+
+impl Labels {
+    /// Distance of a grain's label from that of the edge (m); none of what has none.
+    fn of(&self, grain: &GrainSample) -> Option<f64> {
+        let label = self.given.get(grain.id as usize).copied();
+        label.filter(|label| *label < NO_LABEL && !grain.fixed)
+    }
+
+    /// Where the edge was at a height when labels were given (m).
+    fn base_at(&self, cells: &Cells, z: f64) -> f64 {
+        let rows = cells.rows(z).into_iter();
+        rows.map(|(row, hat)| hat * self.base[row]).sum()
     }
 }
 
@@ -128,10 +168,11 @@ pub struct MaterialEdge {
     spec: MaterialEdgeSpec,
     cells: Cells,
     collapse: Collapse,
-    /// Mass of the continuum, copy included (kg).
+    /// Mass of the continuum, copy included, and of what rests behind it (kg).
     continuum_mass: f64,
-    /// By grain number; [`NO_LABEL`] for what has none.
-    labels: Vec<f64>,
+    rest_mass: f64,
+    labels: Labels,
+    journey: Journey,
     sums: Sums,
     view: View,
     held: Held,
@@ -171,20 +212,25 @@ impl MaterialEdge {
         let free = || sighting.snapshot.grains.iter().filter(|g| !g.fixed);
         let last = free().map(|g| g.id).max().unwrap_or(0) as usize;
         let mut labels = vec![NO_LABEL; last + 1];
-        let (mut before, mut total) = (0.0, 0.0);
+        let (mut behind, mut before, mut total) = (0.0, 0.0, 0.0);
         for grain in free() {
             let label = grain.position.x - spec.place;
             total += grain.mass;
-            if label < inner {
+            if grain.position.x < spec.wall {
+                behind += grain.mass;
+            } else if label < inner {
                 before += grain.mass;
             }
             labels[grain.id as usize] = label;
         }
-        let mut edge = Self::around(spec, before, labels, simulation)?;
+        let mut edge = Self::around(spec, [before, behind], labels, simulation)?;
         edge.sighting = sighting;
         edge.account.mass = total;
         // Stresses as they are while all grains are still there.
         edge.sum_up(1.0);
+        if let Some(travel) = spec.travel {
+            edge.put_by(&travel, simulation);
+        }
         let floor = spec.place - spec.settings.inner;
         let place = spec.place;
         simulation.remove(|g| g.position.x < if g.fixed { floor } else { place });
@@ -201,7 +247,7 @@ impl MaterialEdge {
 
     fn around(
         spec: MaterialEdgeSpec,
-        mass: f64,
+        [mass, rest_mass]: [f64; 2],
         labels: Vec<f64>,
         simulation: &Simulation,
     ) -> Result<Self, OverlapError> {
@@ -209,6 +255,7 @@ impl MaterialEdge {
         let axes = collapse.flow().grid().axes();
         let cells = Cells {
             counts: [axes[0].cells(), axes[1].cells()],
+            low: spec.wall,
             spacing: spec.spacing(),
             slab: spec.slab,
         };
@@ -219,7 +266,13 @@ impl MaterialEdge {
             cells,
             collapse,
             continuum_mass: mass,
-            labels,
+            rest_mass,
+            labels: Labels {
+                given: labels,
+                base: vec![spec.place; cells.counts[1]],
+                edge: 0.0,
+            },
+            journey: Journey::default(),
             sums: Sums::nothing(&cells),
             view: View::default(),
             held: Held {
@@ -246,9 +299,9 @@ impl MaterialEdge {
         })
     }
 
-    /// Label of a free grain (m); none of what has none.
+    /// Label of a free grain from that of the edge (m); none of what has none.
     pub fn label(&self, grain: &GrainSample) -> Option<f64> {
-        label_of(&self.labels, grain)
+        self.labels.of(grain)
     }
 
     /// Whether totals count a grain: it lies in front of the handshake surface, whose other side they count as
@@ -348,7 +401,7 @@ impl MaterialEdge {
         let columns = self.cells.counts[0];
         let cells = self.view.velocity.iter().zip(&self.view.fraction);
         let counted = cells.enumerate().filter(|(cell, _)| {
-            let place = ((cell % columns) as f64 + 0.5) * self.cells.spacing;
+            let place = self.cells.centre(cell % columns);
             place < self.held.handshake[cell / columns]
         });
         let twice: f64 = counted.map(|(_, ([u, w], f))| f * (u * u + w * w)).sum();
@@ -360,9 +413,18 @@ impl MaterialEdge {
         self.continuum_mass
     }
 
+    /// Mass of what rests behind the continuum (kg).
+    pub fn rest_mass(&self) -> f64 {
+        self.rest_mass
+    }
+
     /// Height of the continuum, copy included, over each column of cells (m).
     pub fn continuum_heights(&self) -> (Vec<f64>, Vec<f64>) {
-        self.collapse.profile()
+        let (mut places, heights) = self.collapse.profile();
+        for place in &mut places {
+            *place += self.spec.wall;
+        }
+        (places, heights)
     }
 
     /// ρ U L² W (N s).
@@ -375,9 +437,4 @@ impl MaterialEdge {
     pub fn handshake(&self) -> &[f64] {
         &self.held.handshake
     }
-}
-
-fn label_of(labels: &[f64], grain: &GrainSample) -> Option<f64> {
-    let label = labels.get(grain.id as usize).copied();
-    label.filter(|label| *label < NO_LABEL && !grain.fixed)
 }

@@ -2,7 +2,8 @@
 //!
 //! In a row of cells the edge has moved with the grains of the shell, X = x_b + Σ q (x − x_b − ξ)/Σ q; its area
 //! vector, outwards of the grains, is A = f h W (−1, dX/dz) with f the filled part of the row. The continuum's
-//! traction on it is T = σ A; to it comes the impedance, −Z |A| ((v̄ − u)·n) n.
+//! traction on it is T = σ A; to it comes the impedance, −Z |A| (s·n) n, with s the mean of v − u over the shell's grains,
+//! u at each one's place: what moves and turns as one feels none of it.
 
 use super::cells::{Cells, over};
 
@@ -39,25 +40,25 @@ impl Row {
         }
     }
 
-    /// Force of an impedance on grains that move with a mean velocity (N).
-    pub fn impedance(&self, impedance: f64, mean: [f64; 2]) -> [f64; 2] {
+    /// Force of an impedance on grains that move so much faster than the continuum (N).
+    pub fn impedance(&self, impedance: f64, slip: [f64; 2]) -> [f64; 2] {
         let size = self.area[0].hypot(self.area[1]);
         if size <= 0.0 {
             return [0.0; 2];
         }
         let n = self.area.map(|a| a / size);
-        let through = (mean[0] - self.velocity[0]) * n[0] + (mean[1] - self.velocity[1]) * n[1];
+        let through = slip[0] * n[0] + slip[1] * n[1];
         n.map(|n| -impedance * size * through * n)
     }
 }
 
-/// The shell's weight in each row: Σ q h and Σ q h v.
+/// The shell's weight in each row, and its slip.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Load {
     /// Σ q h (kg).
     pub weight: f64,
-    /// Σ q h v (N s).
-    pub momentum: [f64; 2],
+    /// Σ q h (v − u), u the continuum's velocity at the grain (N s).
+    pub slip: [f64; 2],
 }
 
 /// For each row the one whose grains bear what presses on it: itself, or the next below with grains, or above.
@@ -129,6 +130,7 @@ mod tests {
     fn an_edge_that_leans_has_the_slope_of_its_displacements() {
         let cells = Cells {
             counts: [4, 6],
+            low: 0.0,
             spacing: 0.5,
             slab: 1.0,
         };
@@ -149,9 +151,9 @@ mod tests {
             velocity: [1.0, 1.0],
             ..Row::default()
         };
-        let along = row.impedance(2.0, [1.0 + 4.0, 1.0 + 3.0]);
+        let along = row.impedance(2.0, [4.0, 3.0]);
         assert!(along.iter().all(|f| f.abs() < 1e-13), "{along:?}");
-        let against = row.impedance(2.0, [1.0 - 0.6, 1.0 + 0.8]);
+        let against = row.impedance(2.0, [-0.6, 0.8]);
         // Z |A| times a speed of one along (-0.6, 0.8), the other way.
         assert!((against[0] - 6.0).abs() < 1e-12 && (against[1] + 8.0).abs() < 1e-12);
         assert_eq!(Row::of(&row.numbers()), row);

@@ -26,7 +26,8 @@ impl MaterialEdge {
         (grains + continuum) / self.account.mass - 1.0
     }
 
-    /// The continuum behind the handshake surface as parcels: places along x (m) and volumes of grains in them (m³).
+    /// The continuum behind the handshake surface, and what rests behind it, as parcels: places along x (m) and
+    /// volumes of grains in them (m³).
     pub fn parcels(&self) -> Vec<[f64; 2]> {
         const PARTS: usize = 4;
         let [columns, rows] = self.cells.counts;
@@ -34,7 +35,14 @@ impl MaterialEdge {
         let (h, solid) = (self.cells.spacing, self.spec.case.rheology.solid_fraction);
         let volume = self.cells.volume() * solid / PARTS as f64;
         let fractions = &self.collapse.flow().state().fractions;
-        let mut parcels = Vec::new();
+        let resting = self.rest_mass / self.spec.case.rheology.grain_density;
+        let slices = (PARTS as f64 * self.spec.wall / h).ceil();
+        let mut parcels: Vec<[f64; 2]> = (0..slices as usize)
+            .map(|slice| {
+                let place = (slice as f64 + 0.5) / slices * self.spec.wall;
+                [place, resting / slices]
+            })
+            .collect();
         for (k, &end) in places.iter().enumerate().take(rows) {
             for i in 0..columns {
                 let fraction = fractions[i + columns * k];
@@ -42,7 +50,7 @@ impl MaterialEdge {
                     continue;
                 }
                 for part in 0..PARTS {
-                    let low = (i as f64 + part as f64 / PARTS as f64) * h;
+                    let low = self.cells.face(i) + part as f64 / PARTS as f64 * h;
                     let width = h / PARTS as f64;
                     let share = ((end - low) / width).clamp(0.0, 1.0);
                     if share > 0.0 {

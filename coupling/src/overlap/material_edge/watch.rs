@@ -1,7 +1,7 @@
 //! What the monitors look at after every exchange.
 
+use super::MaterialEdge;
 use super::cells::over;
-use super::{MaterialEdge, label_of};
 
 /// How far beyond the edge a grain has escaped, in diameters.
 const ESCAPED: f64 = 1.0;
@@ -26,7 +26,7 @@ impl MaterialEdge {
             let Some((fraction, [xx, _, _], _)) = self.view.across(&self.cells, place, k) else {
                 continue;
             };
-            let at = place / self.cells.spacing - 0.5;
+            let at = self.cells.offset(place);
             let low = at.floor();
             let hats = [(0, 1.0 - (at - low)), (1, at - low)];
             let mut grains = 0.0;
@@ -60,7 +60,7 @@ impl MaterialEdge {
         let places: Vec<f64> = self.held.rows.iter().map(|row| row.place).collect();
         let escaped = self.sighting.snapshot.grains.iter().filter(|g| {
             let row = self.cells.rows(g.position.z)[0].0;
-            label_of(&self.labels, g).is_some() && g.position.x < places[row] - ESCAPED * d
+            self.labels.of(g).is_some() && g.position.x < places[row] - ESCAPED * d
         });
         let escaped = escaped.count() as f64;
         let m = &mut self.monitors;

@@ -9,7 +9,7 @@ use crate::scene::{ColumnFloorKind, DENSE};
 use crate::state_hash;
 use crate::summary::{Figure, Quantity, Summary};
 use crate::table::Table;
-use colluvium_coupling::overlap::material_edge::MaterialEdge;
+use colluvium_coupling::overlap::material_edge::{MaterialEdge, Move};
 
 /// Limits of the monitors: slip over √(g H), ratio of forces less 1, share of the relaxation.
 const MOST_SLIP: f64 = 0.01;
@@ -25,9 +25,9 @@ impl JoinedColumn<'_> {
             ColumnFloorKind::Rough => FLOOR[0] * scene.slab() / (d * d),
             ColumnFloorKind::Smooth => 0.0,
         };
-        let column = DENSE * scene.height * scene.slab() / scene.grain_volume();
-        let all = column * scene.width() + floor * scene.length();
-        (all - (column + floor) * scene.edge()) / all
+        let per_area = DENSE * scene.slab() / scene.grain_volume();
+        let all = per_area * scene.section(scene.height) + floor * scene.length();
+        (all - (per_area * scene.height + floor) * scene.edge()) / all
     }
 
     /// Where grains end and why, and what joins them.
@@ -44,8 +44,10 @@ impl JoinedColumn<'_> {
         let mut lines = vec![(
             "zones".to_owned(),
             format!(
-                "continuum from the wall to x = {:.4} m ({:.1} d; zones.edge_scaled = {:.4}: {why}), grains beyond; {:.0} % of the \
-                 grain-steps of a column of grains",
+                "continuum from x = {:.4} m (zones.rest_scaled = {:.4}; what lies behind rests) to x = {:.4} m ({:.1} d; zones.edge_scaled = \
+                 {:.4}: {why}), grains beyond; {:.0} % of the grain-steps of a column of grains",
+                scene.rest(),
+                scene.rest() / scene.height,
                 scene.edge(),
                 scene.edge() / d,
                 scene.edge() / scene.height,
@@ -163,6 +165,9 @@ impl JoinedColumn<'_> {
         );
         let mut tables = live.course.tables(places.clone(), deposit.clone());
         tables.extend(sides(self, ran, &live.edge, (places, deposit)));
+        if scene.zones.moving {
+            tables.extend(moves(scene.edge(), &live.edge, summary));
+        }
         summary.figures.insert(
             0,
             Figure::Curves {
@@ -189,9 +194,10 @@ impl JoinedColumn<'_> {
     fn book(&self, ran: &mut Ran, edge: &MaterialEdge, summary: &mut Summary) {
         let steps = ran.simulation.steps_done();
         let [before, now] = [ran.packing.grains.len(), ran.simulation.grain_count()];
-        let spared = steps * (before - now) as u64;
-        summary.cost.grain_steps = summary.cost.grain_steps.saturating_sub(spared);
         let monitors = edge.monitors();
+        let own = monitors.grain_steps as u64;
+        let counted = summary.cost.grain_steps.min(steps * before as u64);
+        summary.cost.grain_steps = summary.cost.grain_steps - counted + own;
         summary.cost.cell_steps = monitors.steps[1] as u64;
         if summary.cost.wall_s > 0.0 {
             summary.cost.grain_steps_per_s = summary.cost.grain_steps as f64 / summary.cost.wall_s;
@@ -201,8 +207,8 @@ impl JoinedColumn<'_> {
         summary.model.cells = edge.cells().count() as u64;
         summary.put(
             "grain_steps_share",
-            Quantity::new(now as f64 / before as f64, "1")
-                .from("grains of the run over those of the whole column, floor included"),
+            Quantity::new(monitors.grain_steps / (steps * before as u64) as f64, "1")
+                .from("grain-steps of the run over those of the whole column, floor included"),
         );
         let account = edge.account(&ran.simulation);
         let grains = account.grains_error(edge.grain_momentum(&mut ran.simulation));
@@ -356,9 +362,14 @@ fn sides(
         .heights(free.map(|g| [g.position.x, volume(g.radius)]), base);
     let (xs, heights) = edge.continuum_heights();
     let spacing = edge.cells().spacing;
-    let continuum = places
-        .iter()
-        .map(|x| heights.get((x / spacing) as usize).copied().unwrap_or(0.0));
+    let continuum =
+        places
+            .iter()
+            .map(|x| (x - edge.cells().low) / spacing)
+            .map(|cells| match cells >= 0.0 {
+                true => heights.get(cells as usize).copied().unwrap_or(0.0),
+                false => heights.first().copied().unwrap_or(0.0),
+            });
     let continuum: Vec<f64> = continuum.collect();
     // Height to which the material lies behind the handshake surface over each place.
     let surface = edge.handshake();
@@ -371,6 +382,8 @@ fn sides(
     let middle = |c: &colluvium_continuum::free_surface::CellFields, axis: usize| {
         0.5 * (c.lower[axis] + c.upper[axis])
     };
+    let across =
+        |c: &colluvium_continuum::free_surface::CellFields| edge.cells().low + middle(c, 0);
     debug_assert_eq!(xs.len(), heights.len());
     vec![
         Table::new("sides")
@@ -380,7 +393,7 @@ fn sides(
             .with("continuum", "m", continuum)
             .with("handshake", "m", handshake),
         Table::new("continuum")
-            .with("x", "m", fields.iter().map(|c| middle(c, 0)).collect())
+            .with("x", "m", fields.iter().map(across).collect())
             .with("z", "m", fields.iter().map(|c| middle(c, 1)).collect())
             .with("fraction", "1", fields.iter().map(|c| c.fraction).collect())
             .with("u", "m/s", fields.iter().map(|c| c.velocity[0]).collect())
@@ -389,4 +402,33 @@ fn sides(
             .with("s", "Pa", fields.iter().map(|c| c.stress[0]).collect())
             .with("tau", "Pa", fields.iter().map(|c| c.stress[1]).collect()),
     ]
+}
+
+/// Moves of the edge with their reasons, in a table and in words.
+fn moves(place: f64, edge: &MaterialEdge, summary: &mut Summary) -> Option<Table> {
+    let all = edge.moves();
+    let inwards = all.iter().filter(|m| m.mass > 0.0);
+    let sum = |sign: f64| {
+        let of = all.iter().map(|m| m.mass * sign);
+        of.filter(|m| *m > 0.0).sum::<f64>()
+    };
+    summary.remarks.push(format!(
+        "The edge moved {} times, {} of them inwards: {:.3} kg became continuum and {:.3} kg grains again; {} moves inwards were refused by \
+         zones.budget, and {} grains were laid on top because their place was taken.",
+        all.len(),
+        inwards.count(),
+        sum(-1.0),
+        sum(1.0),
+        edge.refused_moves(),
+        edge.displaced()
+    ));
+    let column = |f: fn(&Move) -> f64| all.iter().map(f).collect::<Vec<f64>>();
+    let places = all.iter().map(|m| place + m.edge).collect();
+    let table = Table::new("moves")
+        .with("t", "s", column(|m| m.time))
+        .with("edge", "m", places)
+        .with("speed", "m/s", column(|m| m.speed))
+        .with("mass", "kg", column(|m| m.mass))
+        .with("grains", "1", column(|m| m.grains));
+    (!all.is_empty()).then_some(table)
 }

@@ -15,6 +15,10 @@ const FORGIVEN: f64 = 0.02;
 /// Cells of the survey over those of the run, and fewest of them.
 const COARSER: usize = 2;
 const FEWEST: usize = 32;
+/// Material that the continuum alone moves by less than this many diameters rests; so much of a column's height in
+/// front of the last such material is computed all the same.
+const STILL: f64 = 0.02;
+const MARGIN: f64 = 0.5;
 /// Steps at rest after which the survey ends.
 const REST_STEPS: usize = 3;
 
@@ -66,6 +70,9 @@ pub(super) fn survey(scene: &CollapseScene, origin: &str) -> Result<Option<Surve
     let edge = needed.min(most);
     let mut surveyed = scene.clone();
     surveyed.zones.edge_scaled = Some(edge / scene.height);
+    let still = markers.still(STILL * scene.grains.diameter) / scene.height;
+    let most = (edge - least) / scene.height;
+    surveyed.zones.rest_scaled = Some((still - MARGIN).clamp(0.0, most));
     let volumes = markers.needy(tolerance);
     let all: f64 = markers.list.iter().map(|m| m.volume).sum();
     let concerns =
