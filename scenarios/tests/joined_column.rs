@@ -45,13 +45,6 @@ fn a_joined_column_collapses_as_its_grains_do() {
     succeed(folder.path(), &two);
     assert_eq!(hash(&at("joined")), hash(&at("two")));
     succeed(folder.path(), &arguments("control", &none));
-    // Its edge goes with the flow, and grains that have come to rest become continuum.
-    let moving = [
-        "zones.moving=true",
-        "zones.rest_speed_scaled=0.2",
-        "zones.hold_scaled=0.1",
-    ];
-    succeed(folder.path(), &arguments("moving", &moving));
 
     let [grains, joined, control] = ["grains", "joined", "control"].map(|name| summary(&at(name)));
     for name in ["x_front", "runout_scaled", "deposit_height"] {
@@ -98,16 +91,6 @@ fn a_joined_column_collapses_as_its_grains_do() {
     let (joint, without) = (apart("joined"), apart("control"));
     println!("deposits apart: joined {joint:.4}, nothing exchanged {without:.4}");
     assert!(joint < 0.06 && without > 0.08, "{joint} {without}");
-    let moved = summary(&at("moving"));
-    let moves = table(&at("moving").join("moves.csv")).1;
-    println!("moves: {moves:?}; deposits apart {:.4}", apart("moving"));
-    assert!(
-        moves.iter().any(|row| row[3] < 0.0),
-        "grains became continuum"
-    );
-    assert!(apart("moving") < 0.06);
-    assert!(value(&moved, "grain_steps_share") < value(&joined, "grain_steps_share"));
-    assert!(value(&moved, "ledger_grains") < 1e-10 && value(&moved, "handshake_mass").abs() < 0.02);
     assert_eq!(value(&joined, "grains_escaped"), 0.0);
     assert!(value(&control, "grains_escaped") > 10.0);
     assert!(value(&joined, "grain_steps_share") < 0.75);
@@ -153,7 +136,6 @@ fn bad_joined_columns_are_refused_by_key() {
             "zones.tolerance",
             "at least 0.1",
         ),
-        (&["overhang_degrees=10"], "overhang_degrees", "upright"),
         (
             &["overlap.shell_diameters=5"],
             "overlap.shell_diameters",
