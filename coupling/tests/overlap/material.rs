@@ -294,7 +294,7 @@ fn a_journey_goes_on_from_its_numbers_and_within_its_budget() {
     let mut memory = Vec::new();
     joined.edge.write(&mut memory);
     let record = joined.simulation.checkpoint();
-    let spec = joined.edge.spec().clone();
+    let spec = *joined.edge.spec();
     let resumed = Simulation::resume(setup(settled().to_vec(), false), &record).unwrap();
     let edge = MaterialEdge::read(spec, &memory, &resumed).unwrap();
     let mut other = Joined {

@@ -18,7 +18,8 @@ const LARGEST: f64 = 4.0;
 pub struct FluidityFit {
     /// A.
     pub amplitude: f64,
-    /// Where χ² is by ĉ more than at its least: 68 %. From 0 where the local law is no worse than that.
+    /// Where χ² is by ĉ more than at its least: 68 % of what layers scatter by. From 0 where the local law is no worse
+    /// than that. Frictions that differ from flow to flow leave A up to a tenth too large, which the range does not know of.
     pub amplitude_range: [f64; 2],
     /// s: fluidity at the top of the base over the local one.
     pub base: f64,
