@@ -98,6 +98,43 @@ fn a_joined_column_collapses_as_its_grains_do() {
     assert!(report.contains("handshake"));
 }
 
+/// Its edge begins far behind the front and goes out over what rests: whole strips of grains become continuum, every book
+/// closes, and two threads give the same bits.
+#[test]
+fn an_edge_that_moves_hands_grains_over_and_keeps_its_books() {
+    let folder = tempfile::tempdir().unwrap();
+    let moving = [
+        "zones.moving=true",
+        "zones.edge_scaled=1.2",
+        "zones.rest_speed_scaled=0.25",
+        "zones.hold_scaled=0.1",
+    ];
+    for threads in ["1", "2"] {
+        let mut run = arguments(threads, &moving);
+        run.extend(["--threads", threads]);
+        succeed(folder.path(), &run);
+    }
+    let [one, two] = ["1", "2"].map(|name| folder.path().join(name));
+    assert_eq!(hash(&one), hash(&two));
+    let (header, moves) = table(&one.join("moves.csv"));
+    let column = |name: &str| header.iter().position(|h| h == name).unwrap();
+    let [mass, grains, edge] = ["mass", "grains", "edge"].map(column);
+    println!("moves: {moves:?}");
+    assert!(!moves.is_empty() && moves.iter().all(|row| row[mass] < 0.0));
+    let pairs = moves.iter().zip(&moves[1..]);
+    for (before, after) in pairs {
+        assert!(after[grains] < before[grains]);
+        assert!((after[edge] - before[edge] - 0.3).abs() < 1e-9);
+    }
+    let found = summary(&one);
+    // An edge that stayed there would leave 0.59 of the grains.
+    assert!(value(&found, "grain_steps_share") < 0.45);
+    assert!(value(&found, "handshake_mass").abs() < 0.01);
+    assert!(value(&found, "ledger_grains") < 1e-10);
+    assert!(value(&found, "ledger_exchange") < 1e-10);
+    assert!(found["ledger"]["mass_relative"].as_f64().unwrap().abs() < 1e-12);
+}
+
 #[test]
 fn bad_joined_columns_are_refused_by_key() {
     let folder = tempfile::tempdir().unwrap();

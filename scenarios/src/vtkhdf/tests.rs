@@ -16,6 +16,11 @@ fn frame(time: f64, points: usize, cells: Cells) -> Frame {
                 values: Values::Counts((0..count as i64).collect()),
             },
             Field {
+                name: "orientation".into(),
+                unit: "1".into(),
+                values: Values::Quaternions(vec![[0.5, time, 0.5, -0.5]; count]),
+            },
+            Field {
                 name: "radius".into(),
                 unit: "m".into(),
                 values: Values::Scalars(scalars),
@@ -32,7 +37,15 @@ fn frame(time: f64, points: usize, cells: Cells) -> Frame {
 #[test]
 fn a_frame_reads_back() {
     let folder = tempfile::tempdir().unwrap();
-    for (cells, points) in [(Cells::Points, 8), (Cells::Lines, 8), (Cells::Lines, 0)] {
+    for (cells, points) in [
+        (Cells::Points, 8),
+        (Cells::Lines, 8),
+        (Cells::Lines, 0),
+        (Cells::Triangles, 9),
+        (Cells::Quadrilaterals, 8),
+        (Cells::Hexahedra, 16),
+        (Cells::Hexahedra, 0),
+    ] {
         let path = folder.path().join("frame.vtkhdf");
         write(&path, [Ok(frame(0.5, points, cells))]).unwrap();
         assert_eq!(read_frame(&path).unwrap(), frame(0.5, points, cells));
