@@ -4,7 +4,8 @@
 
 use colluvium_continuum::Error;
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
-use colluvium_continuum::free_surface::{Outside, SurfaceOptions};
+use colluvium_continuum::free_surface::{Outside, SpaceFlow, SurfaceOptions};
+use colluvium_continuum::grid::{Axis, Boundary, Grid};
 use colluvium_continuum::rheology::MuI;
 
 /// Cells over the height, which is the width; in natural units the column is 1 high.
@@ -105,4 +106,111 @@ fn what_does_not_fit_is_refused() {
     outside.share[0] = 0.0;
     outside.force[0] = [f64::NAN, 0.0];
     assert!(collapse.flow_mut().set_outside(outside).is_err());
+}
+
+/// Cells of a bed in space along each axis, and how far a pit reaches from the middle and from the floor.
+const BED: [usize; 3] = [10, 8, 6];
+const PIT: [usize; 3] = [2, 2, 3];
+const LAYERS: usize = 5;
+
+/// A bed 1 deep between smooth walls, with a pit in its middle.
+fn bed_with_pit() -> SpaceFlow<MuI> {
+    let spacing = 1.0 / LAYERS as f64;
+    let axis = |cells: usize, low| Axis::Bounded {
+        length: spacing * cells as f64,
+        cells,
+        low,
+        high: Boundary::FreeSlip,
+    };
+    let grid = Grid::with_moving_surface([
+        axis(BED[0], Boundary::FreeSlip),
+        axis(BED[1], Boundary::FreeSlip),
+        axis(BED[2], Boundary::NoSlip { velocity: 0.0 }),
+    ])
+    .unwrap();
+    let mut fractions = vec![0.0; BED.iter().product()];
+    for (cell, fraction) in fractions.iter_mut().enumerate() {
+        let [i, j, k] = place(cell);
+        let off = |i: usize, axis: usize| (i as f64 + 0.5 - 0.5 * BED[axis] as f64).abs();
+        let in_pit = off(i, 0) < PIT[0] as f64 && off(j, 1) < PIT[1] as f64 && k >= PIT[2];
+        *fraction = f64::from(u8::from(k < LAYERS && !in_pit));
+    }
+    let law = MuI::new(0.5, 0.8, 0.4, 0.05, 0.6, 1.0 / 0.6);
+    SpaceFlow::in_space(
+        grid,
+        fractions,
+        law,
+        [0.0, 0.0, -1.0],
+        SurfaceOptions::default(),
+    )
+    .unwrap()
+}
+
+fn place(cell: usize) -> [usize; 3] {
+    [
+        cell % BED[0],
+        cell / BED[0] % BED[1],
+        cell / (BED[0] * BED[1]),
+    ]
+}
+
+/// Matter in the pit that stands as high as the bed, with σ_xx = σ_yy = K σ_zz.
+fn filling_the_pit(ratio: f64) -> Outside<3, 5> {
+    let cells = BED.iter().product();
+    let mut outside = Outside::nothing(cells);
+    for cell in 0..cells {
+        let depth = 1.0 - (place(cell)[2] as f64 + 0.5) / LAYERS as f64;
+        if depth > 0.0 {
+            outside.pressure[cell] = (1.0 + 2.0 * ratio) / 3.0 * depth;
+            // (τ_xx + τ_yy − 2 τ_zz)/(2√3) of σ = −depth (K, K, 1).
+            outside.stress[cell][1] = (1.0 - ratio) * depth / 3.0_f64.sqrt();
+            outside.cover[cell] = 1.0;
+        }
+    }
+    outside
+}
+
+/// Largest speed over √(g H) after 0.2 √(H/g).
+fn speed_of_pit(outside: Option<Outside<3, 5>>) -> f64 {
+    let mut flow = bed_with_pit();
+    if let Some(outside) = outside {
+        flow.set_outside(outside).unwrap();
+    }
+    let mut speed = 0.0;
+    while flow.state().time < 0.2 * (1.0 - 1e-9) {
+        speed = flow.step(0.2).unwrap().max_speed;
+    }
+    speed
+}
+
+/// A pit in space that is full of other matter stays as it is; an empty one falls in, as does one whose filling
+/// thrusts with a tenth of its weight.
+#[test]
+fn a_pit_in_space_stands_when_it_is_filled() {
+    let held = speed_of_pit(Some(filling_the_pit(1.0)));
+    let (weak, empty) = (speed_of_pit(Some(filling_the_pit(0.1))), speed_of_pit(None));
+    println!("pit: filled {held:.1e}, thrust of a tenth {weak:.3}, empty {empty:.3}");
+    assert!(held < 1e-9, "{held}");
+    assert!(empty > 0.05 && weak < empty, "{weak} {empty}");
+}
+
+/// A force on cells of a bed in space gives it that momentum.
+#[test]
+fn forces_in_space_are_taken_whole() {
+    let mut flow = bed_with_pit();
+    let mut outside = filling_the_pit(1.0);
+    // Upwards, in a cell of the floor's third layer: more than weight and walls bear.
+    let cell = 1 + BED[0] * (1 + BED[1] * 2);
+    outside.force[cell] = [0.0, 0.0, 0.5];
+    flow.set_outside(outside.clone()).unwrap();
+    flow.step(1.0).unwrap();
+    let lifted = flow.momentum()[2];
+    println!(
+        "momentum {lifted:.3e} after {:.3e}",
+        flow.state().velocity_time
+    );
+    assert!(lifted > 0.0);
+    assert_eq!(flow.take_untaken(), [0.0; 3]);
+    outside.force[cell][1] = f64::INFINITY;
+    assert!(flow.set_outside(outside).is_err());
 }

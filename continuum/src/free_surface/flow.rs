@@ -52,7 +52,7 @@ type RolesOver<const D: usize> =
     fn(&Ground<D>, &Topology<D>, &[f64], [f64; D], ThinLayer) -> Faces<D>;
 /// Makes the operators of material over ground.
 type OperatorsOver<const D: usize, const C: usize, const V: usize> =
-    for<'a> fn(&Material<'a, D>, &Ground<D>) -> Operators<D, C, V>;
+    for<'a> fn(&Material<'a, D, C>, &Ground<D>) -> Operators<D, C, V>;
 
 /// A flow with a moving surface, in a plane or in space.
 pub struct SurfaceFlow<
@@ -72,10 +72,10 @@ pub struct SurfaceFlow<
     transport: Transport<D>,
     side_walls: Option<SideWalls>,
     bed: Option<Bed<D, C, V>>,
-    /// What acts from outside; so far in a plane only.
-    outside: Option<Outside>,
+    /// What acts from outside.
+    outside: Option<Outside<D, C>>,
     /// Impulse of forces from outside that nobody has taken.
-    untaken: [f64; DIMENSIONS],
+    untaken: [f64; D],
     inflow: Option<Inflow>,
     /// Matter and ground together.
     filled: Vec<f64>,
@@ -86,33 +86,31 @@ pub struct SurfaceFlow<
     spent: Spent,
 }
 
-impl<R: Rheology> SurfaceFlow<R> {
+/// A flow with a moving surface in space.
+pub type SpaceFlow<R> = SurfaceFlow<R, 3, SPACE_COMPONENTS, SPACE_VELOCITIES>;
+
+impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R, D, C, V> {
     /// From now on this acts from outside; on a flow over ground nothing does.
     ///
     /// # Errors
     /// What belongs to another grid, or is out of range.
-    pub fn set_outside(&mut self, outside: Outside) -> Result<(), Error> {
+    pub fn set_outside(&mut self, outside: Outside<D, C>) -> Result<(), Error> {
         outside.validate(self.topology.cells())?;
         self.outside = Some(outside);
         Ok(())
     }
 
     /// What acts from outside.
-    pub fn outside(&self) -> Option<&Outside> {
+    pub fn outside(&self) -> Option<&Outside<D, C>> {
         self.outside.as_ref()
     }
 
     /// Impulse of forces from outside on cells without a velocity of their own since the last call; forgotten
     /// by it.
-    pub fn take_untaken(&mut self) -> [f64; DIMENSIONS] {
-        std::mem::take(&mut self.untaken)
+    pub fn take_untaken(&mut self) -> [f64; D] {
+        std::mem::replace(&mut self.untaken, [0.0; D])
     }
-}
 
-/// A flow with a moving surface in space.
-pub type SpaceFlow<R> = SurfaceFlow<R, 3, SPACE_COMPONENTS, SPACE_VELOCITIES>;
-
-impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R, D, C, V> {
     /// Part of each cell that is free of ground.
     pub fn free_parts(&self) -> Option<&[f64]> {
         self.bed.as_ref().map(|bed| bed.ground.free.as_slice())

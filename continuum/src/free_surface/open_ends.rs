@@ -71,7 +71,7 @@ impl Inflow {
     }
 }
 
-impl<const D: usize> Material<'_, D> {
+impl<const D: usize, const C: usize> Material<'_, D, C> {
     /// Speed that is given on a face: that of the inflow.
     pub(super) fn known_velocity(&self, component: usize, face: usize) -> f64 {
         match self.inflow {
@@ -88,7 +88,7 @@ impl<const D: usize> Material<'_, D> {
     }
 
     /// Flux through a face on the edge, which bears no force of its own.
-    pub(super) fn add_flux_at_edge<const C: usize, const V: usize>(
+    pub(super) fn add_flux_at_edge<const V: usize>(
         &self,
         p: usize,
         cell: usize,
@@ -108,7 +108,7 @@ impl<const D: usize> Material<'_, D> {
     }
 
     /// Adds γ₂ = ∂u/∂z + ∂w/∂x at a corner of an open end, if it is one.
-    pub(super) fn add_shear_at_edge<const C: usize, const V: usize>(
+    pub(super) fn add_shear_at_edge<const V: usize>(
         &self,
         corner: [usize; D],
         point: &mut QuadraturePoint<C, V>,

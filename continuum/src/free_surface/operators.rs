@@ -38,7 +38,7 @@ pub(crate) const fn points_of(axes: usize) -> usize {
 }
 
 /// Material on a grid: what the operators are made from.
-pub(crate) struct Material<'a, const D: usize = DIMENSIONS> {
+pub(crate) struct Material<'a, const D: usize = DIMENSIONS, const C: usize = COMPONENTS> {
     pub grid: &'a Grid<D>,
     pub topology: &'a Topology<D>,
     pub fractions: &'a [f64],
@@ -51,7 +51,7 @@ pub(crate) struct Material<'a, const D: usize = DIMENSIONS> {
     /// Acceleration by gravity.
     pub acceleration: [f64; D],
     /// What lies beyond the surface, if it is not free.
-    pub outside: Option<&'a Outside>,
+    pub outside: Option<&'a Outside<D, C>>,
 }
 
 /// The operators, and the place of each quadrature point on the grid: cell times [`points_of`] plus
@@ -65,8 +65,8 @@ pub(crate) struct Operators<
     pub places: Vec<usize>,
 }
 
-impl<const D: usize> Material<'_, D> {
-    pub(crate) fn operators<const C: usize, const V: usize>(&self) -> Operators<D, C, V> {
+impl<const D: usize, const C: usize> Material<'_, D, C> {
+    pub(crate) fn operators<const V: usize>(&self) -> Operators<D, C, V> {
         let mut parts = Parts {
             mass: self.masses(),
             components: self.faces.own.iter().map(|&(c, _)| c).collect(),
@@ -154,7 +154,7 @@ impl<const D: usize> Material<'_, D> {
     }
 
     /// Divergence of active cells, and the force of their pressure.
-    fn add_pressure_forces<const C: usize, const V: usize>(&self, parts: &mut Parts<D, C, V>) {
+    fn add_pressure_forces<const V: usize>(&self, parts: &mut Parts<D, C, V>) {
         for (p, &cell) in self.faces.active.iter().enumerate() {
             for axis in 0..D {
                 for side in 0..2 {
@@ -192,7 +192,7 @@ impl<const D: usize> Material<'_, D> {
     }
 
     /// Force of the slope of their own surface on the velocities of thin layers.
-    fn add_thin_layers<const C: usize, const V: usize>(&self, parts: &mut Parts<D, C, V>) {
+    fn add_thin_layers<const V: usize>(&self, parts: &mut Parts<D, C, V>) {
         for (j, &(component, face)) in self.faces.own.iter().enumerate() {
             if !self.faces.is_thin[j] {
                 continue;
@@ -221,7 +221,7 @@ impl<const D: usize> Material<'_, D> {
     }
 
     /// Adds the quadrature points of one cell, one for each corner.
-    fn add_points<const C: usize, const V: usize>(
+    fn add_points<const V: usize>(
         &self,
         cell: usize,
         points: &mut Vec<QuadraturePoint<C, V>>,
@@ -299,7 +299,7 @@ impl<const D: usize> Material<'_, D> {
 
     /// The friction of side walls on a quarter of a cell, whose velocity is that of the two faces
     /// beside it. A layer too thin for a pressure presses against them with half its weight.
-    fn rubbing<const C: usize, const V: usize>(
+    fn rubbing<const V: usize>(
         &self,
         walls: SideWalls,
         cell: usize,
@@ -368,7 +368,7 @@ impl<const D: usize> Material<'_, D> {
 
     /// Adds the stretching of a cell along an axis to a component of the strain rate, if both of its faces
     /// move.
-    fn add_stretching<const C: usize, const V: usize>(
+    fn add_stretching<const V: usize>(
         &self,
         cell: usize,
         axis: usize,
@@ -466,7 +466,7 @@ impl<const D: usize> Material<'_, D> {
 
     /// Adds the linear interpolation of pressure to a corner. On a wall it is extrapolated from the
     /// two cells above it; under a thin layer it is the layer's weight.
-    fn add_corner_pressure<const C: usize, const V: usize>(
+    fn add_corner_pressure<const V: usize>(
         &self,
         corner: [usize; D],
         point: &mut QuadraturePoint<C, V>,

@@ -7,7 +7,7 @@
 //! p = c p̂ on the surface,      stress of a cell = w ŝ + (1 − w) s,      force of a cell = F
 //! ```
 //! c says how far the surface is covered (0: free), w is the share of the given stress. Forces go half to each of
-//! the two faces of a cell, or all to the one that moves. Flows in a plane only are acted on so far.
+//! the two faces of a cell, or all to the one that moves.
 
 use super::faces::Faces;
 use super::operators::points_of;
@@ -21,28 +21,28 @@ const LARGEST_SHARE: f64 = 0.95;
 
 /// What acts from outside, cell by cell, in the flow's units.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub struct Outside {
+pub struct Outside<const D: usize = DIMENSIONS, const C: usize = COMPONENTS> {
     /// Pressure p̂ of the matter outside.
     pub pressure: Vec<f64>,
     /// How far it covers a surface, c in [0, 1].
     pub cover: Vec<f64>,
-    /// ŝ = ((σ_xx − σ_zz)/2, σ_xz) of that matter, positive in tension.
-    pub stress: Vec<[f64; COMPONENTS]>,
+    /// ŝ = ((σ_xx − σ_zz)/2, σ_xz) of that matter, or the five components of [`crate::strain`], positive in tension.
+    pub stress: Vec<[f64; C]>,
     /// Its share w in [0, 1].
     pub share: Vec<f64>,
     /// Force on the matter of each cell.
-    pub force: Vec<[f64; DIMENSIONS]>,
+    pub force: Vec<[f64; D]>,
 }
 
-impl Outside {
+impl<const D: usize, const C: usize> Outside<D, C> {
     /// Nothing, on so many cells.
     pub fn nothing(cells: usize) -> Self {
         Self {
             pressure: vec![0.0; cells],
             cover: vec![0.0; cells],
-            stress: vec![[0.0; COMPONENTS]; cells],
+            stress: vec![[0.0; C]; cells],
             share: vec![0.0; cells],
-            force: vec![[0.0; DIMENSIONS]; cells],
+            force: vec![[0.0; D]; cells],
         }
     }
 
@@ -70,8 +70,9 @@ impl Outside {
                 require((0.0..=1.0).contains(&value), key, value, "in [0, 1]")?;
             }
         }
-        let stresses = self.stress.iter().chain(&self.force).flatten();
-        for &value in self.pressure.iter().chain(stresses) {
+        let stresses = self.stress.iter().flatten();
+        let forces = self.force.iter().flatten();
+        for &value in self.pressure.iter().chain(stresses).chain(forces) {
             require(value.is_finite(), "outside", value, "finite")?;
         }
         Ok(())
@@ -84,7 +85,7 @@ impl Outside {
     }
 
     /// Lays the given share of the stress and the forces on the velocities; `places` are those of the points.
-    pub(super) fn lay<const D: usize, const C: usize, const V: usize>(
+    pub(super) fn lay<const V: usize>(
         &self,
         parts: &mut Parts<D, C, V>,
         places: &[usize],
@@ -118,12 +119,8 @@ impl Outside {
     }
 
     /// Forces of cells none of whose faces moves: nobody takes them.
-    pub(super) fn untaken<const D: usize>(
-        &self,
-        faces: &Faces<D>,
-        topology: &Topology<D>,
-    ) -> [f64; DIMENSIONS] {
-        let mut sums = [0.0; DIMENSIONS];
+    pub(super) fn untaken(&self, faces: &Faces<D>, topology: &Topology<D>) -> [f64; D] {
+        let mut sums = [0.0; D];
         for (cell, force) in self.force.iter().enumerate() {
             for (axis, sum) in sums.iter_mut().enumerate() {
                 if force[axis] != 0.0 && movers(faces, topology, cell, axis) == [None; 2] {

@@ -155,7 +155,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             bed: None,
             inflow: None,
             outside: None,
-            untaken: [0.0; DIMENSIONS],
+            untaken: [0.0; D],
             filled: Vec::new(),
             solver: None,
             unknowns: FlowState {
