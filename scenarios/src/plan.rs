@@ -47,7 +47,7 @@ pub fn plan(scene: &Scene) -> Result<String, Failure> {
         SceneBody::Impact(body) => impact(scene, body),
         SceneBody::Chute(body) => bed::chute(body),
         SceneBody::Settle(body) => bed::settle(body),
-        SceneBody::Grains(kind) => world::plan(scene, kind.recipe()),
+        SceneBody::Grains(kind) => kind.act(&scene.origin, |recipe| world::plan(scene, recipe)),
     }
 }
 

@@ -2,7 +2,7 @@
 
 mod angle_of_repose;
 pub mod bagnold;
-mod ball_impact;
+pub mod ball_impact;
 pub mod bed;
 mod boulder;
 pub mod chute;
@@ -243,7 +243,9 @@ pub fn check(scene: &Scene) -> Result<(), Failure> {
         SceneBody::Impact(body) => impact::check(scene, body),
         SceneBody::Chute(body) => chute::check(scene, body),
         SceneBody::Settle(body) => settle::check(scene, body),
-        SceneBody::Grains(kind) => world::course::check(scene, kind.recipe()),
+        SceneBody::Grains(kind) => {
+            kind.act(&scene.origin, |recipe| world::course::check(scene, recipe))
+        }
         SceneBody::Collapse(body) => collapse::check(scene, body),
         SceneBody::Cylinder(body) => cylinder::check(scene, body),
         SceneBody::OpenChute(body) => open_chute::check(scene, body),
@@ -298,7 +300,9 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> {
             SceneBody::Impact(body) => impact::run(body, &mut under),
             SceneBody::Chute(body) => chute::run(body, &mut under),
             SceneBody::Settle(body) => settle::run(body, &mut under),
-            SceneBody::Grains(kind) => world::course::run(kind.recipe(), &mut under),
+            SceneBody::Grains(kind) => kind.act(&scene.origin, |recipe| {
+                world::course::run(recipe, &mut under)
+            }),
             SceneBody::Collapse(body) => collapse::run(body, &mut under),
             SceneBody::Cylinder(body) => cylinder::run(body, &mut under),
             SceneBody::OpenChute(body) => open_chute::run(body, &mut under),

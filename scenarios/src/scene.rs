@@ -7,6 +7,7 @@
 mod angle_of_repose;
 mod bagnold;
 mod ball_impact;
+mod ball_zones;
 mod bed;
 mod boulder;
 mod check;
@@ -39,7 +40,7 @@ pub mod world;
 
 pub use angle_of_repose::AngleOfReposeScene;
 pub use bagnold::{BagnoldGrid, BagnoldScene, FrictionLaw, RheologyKeys, SolverKeys, SolverMethod};
-pub use ball_impact::BallImpactScene;
+pub use ball_impact::{BallImpactScene, BallModel};
 pub use bed::Pace;
 pub use boulder::BoulderScene;
 pub use chute::ChuteScene;

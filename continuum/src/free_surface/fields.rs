@@ -40,7 +40,7 @@ pub struct CellFields<const D: usize = DIMENSIONS, const C: usize = COMPONENTS> 
 
 impl<const D: usize, const C: usize> CellFields<D, C> {
     /// From natural to SI units, of which the length (m) is given beside the others.
-    pub(crate) fn scale(&mut self, length: f64, units: &Units) {
+    pub fn scale(&mut self, length: f64, units: &Units) {
         for corner in [&mut self.lower, &mut self.upper] {
             *corner = corner.map(|x| x * length);
         }

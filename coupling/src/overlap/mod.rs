@@ -23,6 +23,7 @@
 //! questions of [`ZoneEdge`] alone.
 
 mod averages;
+pub mod bowl;
 mod edge;
 mod exchange;
 mod far_side;

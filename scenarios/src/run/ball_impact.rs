@@ -1,6 +1,7 @@
 //! A ball that falls into a bed of grains.
 
 mod bed_file;
+pub mod joined;
 
 use super::world::workshop::{Surroundings, softened, step_for};
 use super::world::{Expected, Ran, Recipe, Workshop, World};
@@ -107,9 +108,9 @@ impl BallImpactScene {
     }
 
     /// Height of the bed's surface (m): twice that of its centre of mass.
-    fn surface(&self, packing: &Packing) -> f64 {
+    fn surface(&self, bed: &[Grain]) -> f64 {
         let (mut mass, mut moment) = (0.0, 0.0);
-        for grain in packing.grains.iter().filter(|g| !g.fixed) {
+        for grain in bed.iter().filter(|g| !g.fixed) {
             mass += grain.mass();
             moment += grain.mass() * (grain.position.z - self.floor());
         }
@@ -117,10 +118,10 @@ impl BallImpactScene {
     }
 
     /// The part of the bed that its solid fraction is measured in.
-    fn middle(&self, packing: &Packing) -> Region {
+    fn middle(&self, bed: &[Grain]) -> Region {
         let half =
             0.5 * self.scale * Vector3::new(self.container.length, self.container.width, 0.0);
-        let depth = self.surface(packing) - self.floor();
+        let depth = self.surface(bed) - self.floor();
         let at = |share: f64| Vector3::new(0.0, 0.0, self.floor() + share * depth);
         Region::Block {
             lower: at(0.125) - half,
@@ -187,7 +188,17 @@ impl Recipe for BallImpactScene {
 
     fn provenance(&self) -> Option<toml::Table> {
         let mut keys = toml::Table::try_from(self).unwrap_or_default();
-        for later in ["model", "speed", "duration", "packing", "output", "ball"] {
+        for later in [
+            "model",
+            "speed",
+            "duration",
+            "packing",
+            "output",
+            "ball",
+            "zones",
+            "overlap",
+            "continuum",
+        ] {
             keys.remove(later);
         }
         for step in ["seconds", "safety"] {
@@ -231,7 +242,7 @@ impl Recipe for BallImpactScene {
                 shop.relax(&around, &rest)?;
             }
         }
-        let middle = self.middle(&shop.packing);
+        let middle = self.middle(&shop.packing.grains);
         shop.measure(&around, &middle, self.gravity).map(drop)
     }
 
@@ -301,7 +312,7 @@ impl Recipe for BallImpactScene {
     fn conclude(&self, ran: &mut Ran, summary: &mut Summary) -> Result<Vec<Table>, Failure> {
         let column = |name: &str| ran.history.column(name).to_vec();
         let (t, z, vz) = (column("t"), column("ball_z"), column("ball_vz"));
-        let surface = self.surface(&ran.packing);
+        let surface = self.surface(&ran.packing.grains);
         let radius = self.ball_radius();
         let touch = surface + radius;
         let lowest = (0..z.len())
@@ -344,7 +355,11 @@ impl Recipe for BallImpactScene {
             Quantity::new(vz[last], "m/s").from("of the ball, upwards"),
         );
         let domain = ran.packing.domain;
-        let solid = solid_fraction(&ran.packing.grains, &domain, &self.middle(&ran.packing));
+        let solid = solid_fraction(
+            &ran.packing.grains,
+            &domain,
+            &self.middle(&ran.packing.grains),
+        );
         let source = "the benchmark's own bed, from its places (Dosta et al. 2024)";
         let [published, touching] = PUBLISHED_BED;
         summary.put(

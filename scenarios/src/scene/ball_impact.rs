@@ -1,5 +1,7 @@
 //! A ball that falls into a bed of grains.
 
+use super::ball_zones::{BallZoneKeys, BedContinuumKeys};
+use super::collapse_zones::ColumnOverlapKeys;
 use super::world::{
     GrainMaterialKeys, Materials, OutputKeys, Place, StepKeys, SurfaceKeys, materials,
 };
@@ -14,6 +16,8 @@ use std::collections::BTreeMap;
 pub enum BallModel {
     /// Grains.
     Dem,
+    /// Grains in a box about the ball, a continuum beyond it.
+    Hybrid,
 }
 
 /// A ball hits a bed of grains in a box. At scale 1 the penetration benchmark of Dosta et al. 2024.
@@ -49,6 +53,15 @@ pub struct BallImpactScene {
     pub ball: BallKeys,
     /// The box.
     pub container: ContainerKeys,
+    /// Where grains stay, with model = "hybrid".
+    #[serde(default)]
+    pub zones: BallZoneKeys,
+    /// How grains and continuum are joined, with model = "hybrid".
+    #[serde(default)]
+    pub overlap: ColumnOverlapKeys,
+    /// The continuum, with model = "hybrid".
+    #[serde(default)]
+    pub continuum: BedContinuumKeys,
     /// The step.
     #[serde(default)]
     pub timestep: StepKeys,
@@ -157,6 +170,6 @@ impl BallImpactScene {
                 return Err(at("container").refuse(key, edge, least));
             }
         }
-        Ok(())
+        self.check_zones(origin)
     }
 }

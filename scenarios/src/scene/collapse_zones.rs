@@ -122,7 +122,7 @@ pub struct ColumnOverlapKeys {
 
 impl ColumnOverlapKeys {
     /// The settings, for grains of this mean diameter (m) and this √(d/g) (s).
-    fn settings(&self, diameter: f64, time: f64) -> OverlapSettings {
+    pub(super) fn settings(&self, diameter: f64, time: f64) -> OverlapSettings {
         let soon = Some(TOGETHER * time);
         let length = |diameters: Option<f64>| diameters.map(|n| n * diameter);
         OverlapSettings {
@@ -157,6 +157,42 @@ const FEWEST_GRAINS: f64 = 50.0;
 /// Fewest diameters of continuum behind the edge, and of grains in front of the overlap.
 const LEAST_CONTINUUM: f64 = 3.0;
 const LEAST_GRAINS: f64 = 4.0;
+
+/// Settings with nothing left out, or what is wrong with them by the keys that they have in a scene.
+pub(super) fn resolved(
+    settings: &OverlapSettings,
+    scales: &Scales,
+    origin: &str,
+) -> Result<Resolved, SceneError> {
+    settings
+        .resolve(scales, false)
+        .map_err(|error| match error {
+            OverlapError::OutOfRange {
+                key,
+                value,
+                allowed,
+            } => {
+                let (key, unit) = match key {
+                    "inner" | "buffer" | "shell" => {
+                        (format!("overlap.{key}_diameters"), scales.diameter)
+                    }
+                    "cell" => (format!("zones.{key}_diameters"), scales.diameter),
+                    _ => (format!("overlap.{key}"), 1.0),
+                };
+                SceneError::OutOfRange {
+                    file: origin.to_owned(),
+                    key,
+                    // Diameters there and back leave digits behind that nobody wrote.
+                    value: ((value / unit * 1e9).round() / 1e9).to_string(),
+                    range: allowed.to_owned(),
+                }
+            }
+            other => SceneError::Unreadable {
+                file: origin.to_owned(),
+                message: other.to_string(),
+            },
+        })
+}
 
 impl CollapseScene {
     /// Distance of the edge from the wall (m), given or computed.
@@ -207,34 +243,7 @@ impl CollapseScene {
                 .stiffness
                 .unwrap_or(grains.stiffness_scaled * mass * self.gravity / d),
         };
-        let settings = self
-            .overlap
-            .settings(d, scales.time)
-            .resolve(&scales, false);
-        settings.map_err(|error| match error {
-            OverlapError::OutOfRange {
-                key,
-                value,
-                allowed,
-            } => {
-                let length = ["inner", "buffer", "shell"].contains(&key);
-                let (key, unit) = match length {
-                    true => (format!("overlap.{key}_diameters"), d),
-                    false => (format!("overlap.{key}"), 1.0),
-                };
-                SceneError::OutOfRange {
-                    file: origin.to_owned(),
-                    key,
-                    // Diameters there and back leave digits behind that nobody wrote.
-                    value: ((value / unit * 1e9).round() / 1e9).to_string(),
-                    range: allowed.to_owned(),
-                }
-            }
-            other => SceneError::Unreadable {
-                file: origin.to_owned(),
-                message: other.to_string(),
-            },
-        })
+        resolved(&self.overlap.settings(d, scales.time), &scales, origin)
     }
 
     /// Where the edge may lie with an overlap so wide (m).

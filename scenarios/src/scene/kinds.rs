@@ -3,9 +3,10 @@
 //! A scene is a struct of keys, a recipe (`run::world::Recipe`) and a bundled file of the same name.
 
 use super::{
-    AngleOfReposeScene, BallImpactScene, BoulderScene, CliffScene, GrainsScene, SceneError,
-    SiloScene, TensileScene, TumblingBoxScene,
+    AngleOfReposeScene, BallImpactScene, BallModel, BoulderScene, CliffScene, GrainsScene,
+    SceneError, SiloScene, TensileScene, TumblingBoxScene,
 };
+use crate::run::ball_impact::joined::JoinedBed;
 use crate::run::world::Recipe;
 use serde_json::Value;
 
@@ -80,6 +81,19 @@ kinds! {
     Cliff(CliffScene) = "cliff",
     /// The Aswan cliff.
     CliffAswan(CliffScene) = "cliff-aswan",
+}
+
+impl Kind {
+    /// Does something with what it does, told the scene file for messages: a bed with a continuum in it is alive in
+    /// between.
+    pub fn act<T>(&self, origin: &str, act: impl FnOnce(&dyn Recipe) -> T) -> T {
+        match self {
+            Kind::BallImpact(keys) if keys.model == BallModel::Hybrid => {
+                act(&JoinedBed::new(keys, origin))
+            }
+            _ => act(self.recipe()),
+        }
+    }
 }
 
 /// Dotted paths of files in scenes of grains; `*` stands for any name, or for each of a list.

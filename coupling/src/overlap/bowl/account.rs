@@ -1,0 +1,201 @@
+//! What grains and continuum give each other, and what the monitors say.
+
+use nalgebra::Vector3;
+
+/// Impulses since the start (N s), and the bed's mass (kg).
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Account {
+    /// Mass of the bed at the start.
+    pub mass: f64,
+    /// Volume that the copy was given when it was made anew, in the continuum's own unit.
+    pub copied: f64,
+    /// Momentum of the grains when the bed was cut, with what walls had taken.
+    pub grains_before: Vector3<f64>,
+    /// Weight of the grains.
+    pub weight: Vector3<f64>,
+    /// Of the continuum's traction on the grains.
+    pub traction: Vector3<f64>,
+    /// Of the impedance on the grains.
+    pub impedance: Vector3<f64>,
+    /// Of the relaxation on the grains; the continuum takes the opposite.
+    pub relaxation: Vector3<f64>,
+    /// Of the relaxation on the continuum.
+    pub answer: Vector3<f64>,
+    /// Of the relaxation on cells that had no velocity to take it.
+    pub untaken: Vector3<f64>,
+}
+
+/// Numbers of an account.
+pub const NUMBERS: usize = 23;
+
+impl Account {
+    /// All of it in a row of numbers.
+    pub fn numbers(&self) -> [f64; NUMBERS] {
+        let rows = [
+            self.grains_before,
+            self.weight,
+            self.traction,
+            self.impedance,
+            self.relaxation,
+            self.answer,
+            self.untaken,
+        ];
+        std::array::from_fn(|k| match k.checked_sub(2) {
+            None => [self.mass, self.copied][k],
+            Some(k) => rows[k / 3][k % 3],
+        })
+    }
+
+    /// From such numbers.
+    pub fn of(n: &[f64; NUMBERS]) -> Self {
+        let row = |k: usize| Vector3::new(n[2 + 3 * k], n[3 + 3 * k], n[4 + 3 * k]);
+        Self {
+            mass: n[0],
+            copied: n[1],
+            grains_before: row(0),
+            weight: row(1),
+            traction: row(2),
+            impedance: row(3),
+            relaxation: row(4),
+            answer: row(5),
+            untaken: row(6),
+        }
+    }
+
+    /// Error of the grains' account over its largest entry, for their momentum now with what walls have taken.
+    pub fn grains_error(&self, now: Vector3<f64>) -> f64 {
+        let entries = [self.weight, self.traction, self.impedance, self.relaxation];
+        let miss = now - self.grains_before - entries.iter().sum::<Vector3<f64>>();
+        over(miss, entries.into_iter().chain([now, self.grains_before]))
+    }
+
+    /// Error of what the relaxation gave to both sides, `owed` being what the continuum has still to take, over the
+    /// largest entry.
+    pub fn exchange_error(&self, owed: Vector3<f64>) -> f64 {
+        let miss = self.relaxation + self.answer + owed;
+        over(miss, [self.relaxation, self.weight].into_iter())
+    }
+}
+
+/// The largest part of a miss over the largest of all entries.
+fn over(miss: Vector3<f64>, entries: impl Iterator<Item = Vector3<f64>>) -> f64 {
+    let largest = entries.fold(0.0, |most: f64, entry| most.max(entry.amax()));
+    if largest > 0.0 {
+        miss.amax() / largest
+    } else {
+        miss.amax()
+    }
+}
+
+/// Sums over the exchanges for means in time.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Monitors {
+    /// Exchanges seen.
+    pub exchanges: f64,
+    /// Σ of the rms slip between both sides at the handshake surface (m/s).
+    pub slip: f64,
+    /// Largest of these (m/s).
+    pub largest_slip: f64,
+    /// Σ of the normal force of the grains' stress through the handshake surface, and of the continuum's (N).
+    pub force: [f64; 2],
+    /// Σ |impulse| of the relaxation, cell by cell, and of the traction, face by face (N s).
+    pub impulse: [f64; 2],
+    /// Most grains beyond the box by more than a diameter.
+    pub escaped: f64,
+    /// Grains times their steps.
+    pub grain_steps: f64,
+    /// Steps of the continuum, and active cells in them.
+    pub steps: [f64; 2],
+    /// Newton iterations of the continuum.
+    pub iterations: f64,
+    /// Largest residual of the continuum's momentum.
+    pub residual: f64,
+}
+
+/// Numbers of the monitors.
+pub const MONITORED: usize = 13;
+
+impl Monitors {
+    /// All of it in a row of numbers.
+    pub fn numbers(&self) -> [f64; MONITORED] {
+        [
+            self.exchanges,
+            self.slip,
+            self.largest_slip,
+            self.force[0],
+            self.force[1],
+            self.impulse[0],
+            self.impulse[1],
+            self.escaped,
+            self.grain_steps,
+            self.steps[0],
+            self.steps[1],
+            self.iterations,
+            self.residual,
+        ]
+    }
+
+    /// From such numbers.
+    pub fn of(n: &[f64; MONITORED]) -> Self {
+        Self {
+            exchanges: n[0],
+            slip: n[1],
+            largest_slip: n[2],
+            force: [n[3], n[4]],
+            impulse: [n[5], n[6]],
+            escaped: n[7],
+            grain_steps: n[8],
+            steps: [n[9], n[10]],
+            iterations: n[11],
+            residual: n[12],
+        }
+    }
+
+    /// Mean rms slip at the handshake surface (m/s).
+    pub fn mean_slip(&self) -> f64 {
+        self.slip / self.exchanges.max(1.0)
+    }
+
+    /// Normal force of the grains' stress over that of the continuum's at the handshake surface.
+    pub fn force_ratio(&self) -> f64 {
+        self.force[0] / self.force[1]
+    }
+
+    /// Impulse of the relaxation over that of the traction.
+    pub fn relaxation_share(&self) -> f64 {
+        self.impulse[0] / self.impulse[1]
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn accounts_and_monitors_come_back_from_their_numbers() {
+        let numbers: [f64; NUMBERS] = std::array::from_fn(|k| k as f64 + 0.5);
+        assert_eq!(Account::of(&numbers).numbers(), numbers);
+        let numbers: [f64; MONITORED] = std::array::from_fn(|k| k as f64 + 0.5);
+        assert_eq!(Monitors::of(&numbers).numbers(), numbers);
+    }
+
+    #[test]
+    fn an_account_that_lacks_an_entry_does_not_close() {
+        let row = Vector3::new;
+        let mut account = Account {
+            grains_before: row(1.0, 0.0, 2.0),
+            weight: row(0.0, 0.0, -8.0),
+            traction: row(3.0, 1.0, 0.5),
+            impedance: row(-1.0, 0.0, 0.0),
+            relaxation: row(0.25, 0.0, 0.25),
+            ..Account::default()
+        };
+        let now = row(3.25, 1.0, -5.25);
+        assert_eq!(account.grains_error(now), 0.0);
+        account.impedance = Vector3::zeros();
+        assert_eq!(account.grains_error(now), 1.0 / 8.0);
+        account.answer = row(-0.25, 0.0, -0.125);
+        assert_eq!(account.exchange_error(row(0.0, 0.0, -0.125)), 0.0);
+        assert!(account.exchange_error(Vector3::zeros()) > 0.01);
+    }
+}

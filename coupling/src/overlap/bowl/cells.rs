@@ -1,0 +1,236 @@
+//! The grid of the continuum around a bowl of grains, and the grains seen from its cells.
+//!
+//! With hats h_c over the centres of cells, which add up to one,
+//!
+//! ```text
+//! M = Σ m h_c,   v̄ = Σ m v h_c/M,   σ V = Σ_contacts f ⊗ l h_c − Σ m v′ ⊗ v′ h_c
+//! ```
+//! l from the centre of the grain that f acts on to that of its partner, h_c at the middle of it, V the volume of a
+//! cell.
+
+use colluvium_dem::{GrainSample, Partner, Snapshot};
+use nalgebra::{Matrix3, Vector3};
+
+/// Cells of a bed in space, x fastest and z slowest (SI).
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub struct Cells {
+    /// How many along each axis.
+    pub counts: [usize; 3],
+    /// Lower corner of the first (m).
+    pub low: [f64; 3],
+    /// Edges of a cell (m).
+    pub spacing: [f64; 3],
+}
+
+impl Cells {
+    /// How many there are.
+    pub fn count(&self) -> usize {
+        self.counts.iter().product()
+    }
+
+    /// Volume of a cell (m³).
+    pub fn volume(&self) -> f64 {
+        self.spacing.iter().product()
+    }
+
+    /// Area of a face across an axis (m²).
+    pub fn face_area(&self, axis: usize) -> f64 {
+        self.volume() / self.spacing[axis]
+    }
+
+    /// Place of a cell along each axis.
+    pub fn index(&self, cell: usize) -> [usize; 3] {
+        let [nx, ny, _] = self.counts;
+        [cell % nx, cell / nx % ny, cell / (nx * ny)]
+    }
+
+    /// The cell at such a place.
+    pub fn cell(&self, [i, j, k]: [usize; 3]) -> usize {
+        i + self.counts[0] * (j + self.counts[1] * k)
+    }
+
+    /// The cell above one, if there is one.
+    pub fn above(&self, cell: usize) -> Option<usize> {
+        let above = cell + self.counts[0] * self.counts[1];
+        (above < self.count()).then_some(above)
+    }
+
+    /// Distance from the first cells' lower faces along an axis, in cells.
+    pub fn offset(&self, axis: usize, at: f64) -> f64 {
+        (at - self.low[axis]) / self.spacing[axis]
+    }
+
+    /// Cells before and behind a place along an axis with their hats, from the first to the last that there are.
+    pub fn along(&self, axis: usize, at: f64, [first, last]: [usize; 2]) -> [(usize, f64); 2] {
+        let place = self.offset(axis, at) - 0.5;
+        let low = place.floor();
+        let share = place - low;
+        let index = |n: f64| (low + n).clamp(first as f64, last as f64) as usize;
+        [(index(0.0), 1.0 - share), (index(1.0), share)]
+    }
+
+    /// The cells around a place with their hats; beyond the grid they are those at its edge.
+    pub fn hats(&self, at: &Vector3<f64>) -> [(usize, f64); 8] {
+        let axes = [0, 1, 2].map(|axis| self.along(axis, at[axis], [0, self.counts[axis] - 1]));
+        std::array::from_fn(|n| {
+            let [x, y, z] = [axes[0][n % 2], axes[1][n / 2 % 2], axes[2][n / 4]];
+            (self.cell([x.0, y.0, z.0]), x.1 * y.1 * z.1)
+        })
+    }
+}
+
+/// Sums over the grains that cover a cell.
+#[derive(Clone, Copy, Debug, Default, PartialEq)]
+pub struct Cover {
+    /// Mass M (kg).
+    pub mass: f64,
+    /// Σ m v h (N s).
+    pub momentum: Vector3<f64>,
+    /// Mass of the grains of the buffer (kg), and Σ m (u − v) h over them with the continuum's u at their places.
+    pub buffer: f64,
+    /// See `buffer` (N s).
+    pub buffer_slip: Vector3<f64>,
+    /// The same of the inner overlap.
+    pub inner: f64,
+    /// The same of the inner overlap (N s).
+    pub inner_slip: Vector3<f64>,
+}
+
+impl Cover {
+    /// Mean velocity (m/s); zero without grains.
+    pub fn velocity(&self) -> Vector3<f64> {
+        over(self.momentum, self.mass)
+    }
+}
+
+/// A quotient, zero where there is nothing to divide by.
+pub fn over(sum: Vector3<f64>, by: f64) -> Vector3<f64> {
+    if by > 0.0 { sum / by } else { Vector3::zeros() }
+}
+
+/// What cells know of the grains.
+#[derive(Clone, Debug, Default)]
+pub struct Sums {
+    /// Of the grains as they are now.
+    pub cover: Vec<Cover>,
+    /// σ averaged in time, positive in tension (Pa).
+    pub stress: Vec<Matrix3<f64>>,
+    instant: Vec<Matrix3<f64>>,
+}
+
+impl Sums {
+    /// Nothing, on these cells.
+    pub fn nothing(cells: &Cells) -> Self {
+        Self {
+            cover: vec![Cover::default(); cells.count()],
+            stress: vec![Matrix3::zeros(); cells.count()],
+            instant: vec![Matrix3::zeros(); cells.count()],
+        }
+    }
+
+    /// Sums masses and velocities of the grains that belong to the bed.
+    pub fn cover(
+        &mut self,
+        cells: &Cells,
+        snapshot: &Snapshot,
+        belongs: impl Fn(&GrainSample) -> bool,
+    ) {
+        self.cover.fill(Cover::default());
+        for grain in snapshot.grains.iter().filter(|grain| belongs(grain)) {
+            for (cell, hat) in cells.hats(&grain.position) {
+                let (cover, mass) = (&mut self.cover[cell], grain.mass * hat);
+                cover.mass += mass;
+                cover.momentum += mass * grain.velocity;
+            }
+        }
+    }
+
+    /// Takes the stresses of now into the averages with this weight. What does not belong to the bed is wall: its
+    /// half of the line between two centres is not material.
+    pub fn press(
+        &mut self,
+        cells: &Cells,
+        snapshot: &Snapshot,
+        weight: f64,
+        belongs: impl Fn(&GrainSample) -> bool,
+    ) {
+        self.instant.fill(Matrix3::zeros());
+        let per_volume = 1.0 / cells.volume();
+        let mut add = |hats: [(usize, f64); 8], tensor: Matrix3<f64>| {
+            for (cell, hat) in hats {
+                self.instant[cell] += hat * tensor;
+            }
+        };
+        for contact in &snapshot.contacts {
+            let grain = &snapshot.grains[contact.grain];
+            let other = match contact.partner {
+                Partner::Grain(j) => Some(&snapshot.grains[j]),
+                Partner::Wall(_) | Partner::Body(_) => None,
+            };
+            let (start, force, branch) = match (belongs(grain), other) {
+                (true, Some(other)) if belongs(other) => (
+                    &grain.position,
+                    contact.force,
+                    contact.arm - contact.partner_arm,
+                ),
+                (true, _) => (&grain.position, contact.force, contact.arm),
+                (false, Some(other)) if belongs(other) => {
+                    (&other.position, -contact.force, contact.partner_arm)
+                }
+                (false, _) => continue,
+            };
+            let tensor = per_volume * force * branch.transpose();
+            let middle = start + 0.5 * branch;
+            add(cells.hats(&middle), 0.5 * (tensor + tensor.transpose()));
+        }
+        for grain in snapshot.grains.iter().filter(|grain| belongs(grain)) {
+            let hats = cells.hats(&grain.position);
+            let mean: Vector3<f64> = hats
+                .iter()
+                .map(|&(cell, hat)| hat * self.cover[cell].velocity())
+                .sum();
+            let own = grain.velocity - mean;
+            add(hats, -grain.mass * per_volume * own * own.transpose());
+        }
+        for (mean, now) in self.stress.iter_mut().zip(&self.instant) {
+            *mean += weight * (now - *mean);
+        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    const CELLS: Cells = Cells {
+        counts: [5, 4, 3],
+        low: [-1.0, 0.5, 0.0],
+        spacing: [0.5, 0.4, 0.25],
+    };
+
+    #[test]
+    fn hats_add_up_to_one_and_interpolate_linearly_inside() {
+        let linear = |at: [f64; 3]| 3.0 * at[0] - at[1] + 0.5 * at[2];
+        let centre = |cell: usize| {
+            let index = CELLS.index(cell);
+            [0, 1, 2].map(|axis| CELLS.low[axis] + (index[axis] as f64 + 0.5) * CELLS.spacing[axis])
+        };
+        for (at, inside) in [
+            ([-0.3, 1.2, 0.4], true),
+            ([0.7, 1.9, 0.2], true),
+            ([-5.0, 9.0, 0.3], false),
+        ] {
+            let hats = CELLS.hats(&at.into());
+            let sum: f64 = hats.iter().map(|h| h.1).sum();
+            assert!((sum - 1.0).abs() < 1e-14);
+            let value: f64 = hats
+                .iter()
+                .map(|&(cell, hat)| hat * linear(centre(cell)))
+                .sum();
+            assert!(!inside || (value - linear(at)).abs() < 1e-13, "{at:?}");
+        }
+        for cell in 0..CELLS.count() {
+            assert_eq!(CELLS.cell(CELLS.index(cell)), cell);
+        }
+    }
+}

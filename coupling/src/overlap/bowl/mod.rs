@@ -1,0 +1,516 @@
+//! Grains in a box within a bed that is a continuum in space around them: the bowl that a ball falls into.
+//!
+//! Grains fill a box of the continuum's cells, open at the top; it stays where it is, for what moves a lot should
+//! lie well inside it. With ξ the distance from the nearest side into the grains, from the sides inwards: *shell*
+//! ξ < b, *buffer* ξ < ξ_m, *inner overlap* ξ_m < ξ < ξ_a; totals count grains inside the handshake surface ξ = ξ_m
+//! and continuum outside it. What is exchanged is what a flat edge exchanges (see [`super`]), cell by cell in space:
+//!
+//! - *on the continuum*: its surface at ξ_a, inside the grains, bears their mean pressure, and from ξ_m to ξ_a its
+//!   deviatoric stress is w σ_grains + (1 − w) σ_continuum, w = (ξ − ξ_m)/(ξ_a − ξ_m) at the middle of a cell
+//!   ([`Outside`]); beyond ξ_m it is a copy of the grains, made anew at every exchange (`copy.rs`);
+//! - *on the grains*: the shell bears the continuum's traction σ n A, face by face of the box, with an impedance in
+//!   its normal part, −Z A (s·n) n, s the mean of v − u over the shell's grains, u at each one's place;
+//! - *on both, equal and opposite*: mean velocities of the buffer relax to each other.
+//!
+//! The continuum is what is missing of the bed's mass, at the solid fraction of its grains, with a level surface.
+//! Spins are not coupled. One grain may belong to neither side: the ball.
+
+mod account;
+mod cells;
+mod continuum;
+mod copy;
+mod exchange;
+mod memory;
+mod watch;
+mod zone;
+
+pub use account::{Account, Monitors};
+pub use cells::Cells;
+pub use zone::Zone;
+
+use super::OverlapError;
+use super::settings::{Resolved, check};
+use super::sighting::Sighting;
+use cells::Sums;
+use colluvium_continuum::free_surface::{Outside, SpaceFields, SpaceFlow, SurfaceOptions};
+use colluvium_continuum::rheology::MuI;
+use colluvium_continuum::units::Units;
+use colluvium_dem::{GrainSample, Simulation};
+use continuum::View;
+use nalgebra::Vector3;
+use zone::Faces;
+
+/// Rows of cells above the surface of the bed, for it to rise into.
+const ROOM: usize = 2;
+/// Rounds in which the height of the continuum and what lies inside the handshake surface come to agree.
+const ROUNDS: usize = 20;
+
+/// What a bowl is made from (SI).
+#[derive(Clone, Copy, Debug)]
+pub struct BowlSpec {
+    /// Lower corner of the bed (m): its floor, and where its walls meet.
+    pub low: [f64; 3],
+    /// Its extent along x and y (m).
+    pub size: [f64; 2],
+    /// Gravity, downwards (m/s²).
+    pub gravity: f64,
+    /// The law of the continuum, at the solid fraction of the grains.
+    pub law: MuI,
+    /// Settings of the continuum's solver.
+    pub options: SurfaceOptions,
+    /// Half of the box's extent along x and y, about the middle of the bed (m), rounded to cells.
+    pub half: [f64; 2],
+    /// Height of its bottom above the floor (m), rounded to cells.
+    pub bottom: f64,
+    /// Widths, times and the impedance.
+    pub settings: Resolved,
+    /// Number of the grain that belongs to neither side.
+    pub ball: Option<u32>,
+}
+
+/// The grid and the box in it.
+#[derive(Clone, Debug)]
+struct Layout {
+    cells: Cells,
+    zone: Zone,
+    /// Cells of the buffer, and of buffer and inner overlap together.
+    widths: [f64; 2],
+    /// Height of the continuum (m).
+    height: f64,
+}
+
+impl BowlSpec {
+    fn belongs(&self) -> impl Fn(&GrainSample) -> bool + use<> {
+        let ball = self.ball;
+        move |grain| !grain.fixed && Some(grain.id) != ball
+    }
+
+    /// Density of the continuum (kg/m³).
+    pub fn density(&self) -> f64 {
+        self.law.bulk_density()
+    }
+
+    fn units(&self, height: f64) -> Units {
+        Units::of_gravity(height, self.density(), self.gravity)
+    }
+
+    /// Cells of buffer, and of buffer and inner overlap together.
+    fn widths(&self) -> [f64; 2] {
+        let s = &self.settings;
+        let [buffer, inner] = [s.buffer, s.inner].map(|w| (w / s.cell).round().max(1.0));
+        [buffer, buffer + inner]
+    }
+
+    /// The grid of a bed of this height, and the box in it.
+    fn layout(&self, height: f64) -> Result<Layout, OverlapError> {
+        let cell = self.settings.cell;
+        let across = |extent: f64| (extent / cell).round().max(1.0) as usize;
+        let filled = across(height);
+        let [x, y] = self.size.map(across);
+        let cells = Cells {
+            counts: [x, y, filled + ROOM],
+            low: self.low,
+            spacing: [
+                self.size[0] / x as f64,
+                self.size[1] / y as f64,
+                height / filled as f64,
+            ],
+        };
+        let widths = self.widths();
+        let margin = |axis: usize| {
+            let count = cells.counts[axis] as f64;
+            let margin = 0.5 * count - self.half[axis] / cells.spacing[axis];
+            margin.round().max(0.0) as usize
+        };
+        let [mx, my] = [margin(0), margin(1)];
+        let mz = (self.bottom / cells.spacing[2]).round().max(0.0) as usize;
+        // Cells of grains beyond the overlap along an axis with that many sides.
+        let inside = |all: usize, margins: [usize; 2]| {
+            let sides = margins.iter().filter(|m| **m > 0).count() as f64;
+            all as f64 - margins[0] as f64 - margins[1] as f64 - sides * widths[1]
+        };
+        for (key, value, left) in [
+            ("half_width along x", self.half[0], inside(x, [mx, mx])),
+            ("half_width along y", self.half[1], inside(y, [my, my])),
+            ("bottom", self.bottom, inside(filled, [mz, 0])),
+        ] {
+            let allowed = "such that a cell of grains is left beyond the overlap";
+            check(key, value, left >= 1.0, allowed)?;
+        }
+        let zone = Zone::new(&cells, [mx, my, mz], [x - mx, y - my]);
+        let allowed = "such that some continuum is left around the grains";
+        check("half_width", self.half[0], !zone.sides.is_empty(), allowed)?;
+        Ok(Layout {
+            cells,
+            zone,
+            widths,
+            height,
+        })
+    }
+
+    /// The grid on which the continuum's mass is what the bed has beyond the grains inside the handshake surface.
+    fn fitting(&self, grains: &[GrainSample]) -> Result<Layout, OverlapError> {
+        let belongs = self.belongs();
+        let bed = || grains.iter().filter(|grain| belongs(grain));
+        let total: f64 = bed().map(|grain| grain.mass).sum();
+        let area = self.size[0] * self.size[1];
+        let mut height = total / (self.density() * area);
+        let mut layout = self.layout(height)?;
+        for _ in 0..ROUNDS {
+            let Layout {
+                cells,
+                zone,
+                widths,
+                ..
+            } = &layout;
+            let inside = bed().filter(|g| zone.label(cells, &g.position) > widths[0]);
+            let inside: f64 = inside.map(|grain| grain.mass).sum();
+            // Of the box within the handshake surface: its part of the area, and where it begins.
+            let across = [0, 1].map(|axis| {
+                let sides = zone.sides.iter().filter(|s| s.axis == axis).count() as f64;
+                let all = (zone.high[axis] - zone.low[axis]) as f64 - sides * widths[0];
+                all / cells.counts[axis] as f64
+            });
+            let part = across[0] * across[1];
+            let below = match zone.low[2] {
+                0 => 0.0,
+                low => (low as f64 + widths[0]) * cells.spacing[2] / height,
+            };
+            let found = (total - inside) / (self.density() * area * (1.0 - part * (1.0 - below)));
+            let settled = (found / height - 1.0).abs() < 1e-12;
+            height = found;
+            layout = self.layout(height)?;
+            if settled {
+                break;
+            }
+        }
+        Ok(layout)
+    }
+}
+
+/// What acts on the grains until the next exchange.
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Held {
+    /// Accelerations of mean velocities of the buffer, cell by cell (m/s²).
+    accelerations: Vec<Vector3<f64>>,
+    /// Force of the continuum on each face of the box (N), the area it acts on (m²), and the continuum's velocity
+    /// there (m/s).
+    traction: Vec<Vector3<f64>>,
+    area: Vec<f64>,
+    velocity: Vec<Vector3<f64>>,
+}
+
+/// Sums of forces that are laid (N), or of their impulses since the last exchange (N s).
+#[derive(Clone, Debug, Default, PartialEq)]
+struct Given {
+    relaxation: Vec<Vector3<f64>>,
+    traction: Vector3<f64>,
+    impedance: Vector3<f64>,
+}
+
+impl Given {
+    fn nothing(cells: usize) -> Self {
+        Self {
+            relaxation: vec![Vector3::zeros(); cells],
+            ..Self::default()
+        }
+    }
+
+    fn clear(&mut self) {
+        self.relaxation.fill(Vector3::zeros());
+        (self.traction, self.impedance) = (Vector3::zeros(), Vector3::zeros());
+    }
+}
+
+/// Grains in a bowl and the continuum around them. The grains are the caller's: every call needs the same simulation.
+pub struct Bowl {
+    spec: BowlSpec,
+    layout: Layout,
+    units: Units,
+    faces: Faces,
+    /// Faces of the handshake surface.
+    handshake: Faces,
+    flow: SpaceFlow<MuI>,
+    /// Mass of grains over each column of cells at the start (kg).
+    columns: Vec<f64>,
+    sums: Sums,
+    view: View,
+    held: Held,
+    laid: Given,
+    given: Given,
+    /// By how much time the first step under what is laid changed velocities (s).
+    kick: f64,
+    /// Impulse that the continuum has still to take from the relaxation (N s).
+    owed: Vec<Vector3<f64>>,
+    /// How far grains have moved outwards through each face of the box (m).
+    moved: Vec<f64>,
+    account: Account,
+    monitors: Monitors,
+    /// Steps for which loads are held, how often until an exchange, and how often since the last one.
+    steps_of_loads: u64,
+    loads_of_exchange: u64,
+    made: u64,
+    exchanges: u64,
+    timestep: f64,
+    sighting: Sighting,
+    scratch: exchange::Scratch,
+    outside: Outside<3, 5>,
+}
+
+impl Bowl {
+    /// Steps of the grains for which loads are held, for a time step (s).
+    pub fn steps_of_loads(settings: &Resolved, timestep: f64) -> u64 {
+        (settings.load_time / timestep).round().max(1.0) as u64
+    }
+
+    /// Cuts a bed at rest: what lies outside the box becomes continuum.
+    ///
+    /// # Errors
+    /// Settings out of range, or a box that leaves no room for grains, overlap or continuum.
+    pub fn cut(spec: BowlSpec, simulation: &mut Simulation) -> Result<Self, OverlapError> {
+        let mut sighting = Sighting::default();
+        sighting.look(simulation);
+        let layout = spec.fitting(&sighting.snapshot.grains)?;
+        let mut bowl = Self::around(spec, layout, simulation)?;
+        bowl.sighting = sighting;
+        // Stresses as they are while all grains are still there.
+        bowl.sum_up(1.0);
+        let (cells, zone) = (bowl.layout.cells, bowl.layout.zone.clone());
+        let belongs = spec.belongs();
+        let bed = bowl.sighting.snapshot.grains.iter().filter(|g| belongs(g));
+        bowl.account.mass = bed.map(|grain| grain.mass).sum();
+        simulation.remove(|g| belongs(g) && zone.label(&cells, &g.position) < 0.0);
+        bowl.sighting.look(simulation);
+        bowl.see_grains();
+        bowl.columns = bowl.column_masses();
+        bowl.account.grains_before = bowl.grain_momentum(simulation);
+        bowl.prime()?;
+        bowl.agree();
+        // What it was primed with is not its state.
+        bowl.view.look(&bowl.flow, &bowl.layout.cells, &bowl.units);
+        bowl.lay(simulation)?;
+        Ok(bowl)
+    }
+
+    fn around(
+        spec: BowlSpec,
+        layout: Layout,
+        simulation: &Simulation,
+    ) -> Result<Self, OverlapError> {
+        let Layout {
+            cells,
+            zone,
+            widths,
+            height,
+        } = &layout;
+        let units = spec.units(*height);
+        let filled = cells.counts[2] - ROOM;
+        let fractions = (0..cells.count()).map(|cell| {
+            let index = cells.index(cell);
+            let is_bed = index[2] < filled && zone.label_of_cell(index) < widths[1];
+            f64::from(u8::from(is_bed))
+        });
+        let flow = continuum::bed(cells, fractions.collect(), &spec.law, &units, &spec.options)?;
+        let faces = Faces::of(cells, zone);
+        let narrowed = zone.narrowed(cells, widths[0] as usize);
+        let handshake = Faces::of(cells, &narrowed);
+        let steps_of_loads = Self::steps_of_loads(&spec.settings, simulation.timestep());
+        let load_time = steps_of_loads as f64 * simulation.timestep();
+        let loads = (spec.settings.exchange_time / load_time).round().max(1.0);
+        let (count, sides) = (cells.count(), faces.all.len());
+        Ok(Self {
+            units,
+            flow,
+            columns: Vec::new(),
+            sums: Sums::nothing(cells),
+            view: View::default(),
+            held: Held {
+                accelerations: vec![Vector3::zeros(); count],
+                traction: vec![Vector3::zeros(); sides],
+                area: vec![0.0; sides],
+                velocity: vec![Vector3::zeros(); sides],
+            },
+            laid: Given::nothing(count),
+            given: Given::nothing(count),
+            kick: 0.0,
+            owed: vec![Vector3::zeros(); count],
+            moved: vec![0.0; sides],
+            account: Account::default(),
+            monitors: Monitors::default(),
+            steps_of_loads,
+            loads_of_exchange: loads as u64,
+            made: 0,
+            exchanges: 0,
+            timestep: simulation.timestep(),
+            sighting: Sighting::default(),
+            scratch: exchange::Scratch::default(),
+            outside: Outside::nothing(count),
+            faces,
+            handshake,
+            spec,
+            layout,
+        })
+    }
+
+    /// What it was made from.
+    pub fn spec(&self) -> &BowlSpec {
+        &self.spec
+    }
+
+    /// The grid of the continuum.
+    pub fn cells(&self) -> &Cells {
+        &self.layout.cells
+    }
+
+    /// The box of grains.
+    pub fn zone(&self) -> &Zone {
+        &self.layout.zone
+    }
+
+    /// The continuum, in natural units.
+    pub fn flow(&self) -> &SpaceFlow<MuI> {
+        &self.flow
+    }
+
+    /// Height of the continuum at the start (m).
+    pub fn height(&self) -> f64 {
+        self.layout.height
+    }
+
+    /// Fields of the continuum's cells behind the handshake surface (SI).
+    pub fn fields(&self) -> Vec<SpaceFields> {
+        let cells = &self.layout.cells;
+        let mut fields = self.flow.cell_fields();
+        for f in &mut fields {
+            f.scale(self.layout.height, &self.units);
+            for corner in [&mut f.lower, &mut f.upper] {
+                for (x, low) in corner.iter_mut().zip(cells.low) {
+                    *x += low;
+                }
+            }
+        }
+        fields.retain(|f| {
+            let middle = Vector3::from_fn(|axis, _| 0.5 * (f.lower[axis] + f.upper[axis]));
+            self.layout.zone.label(cells, &middle) < self.layout.widths[0]
+        });
+        fields
+    }
+
+    /// Accounts since the start, with what the grains have been given since the last exchange.
+    pub fn account(&self, simulation: &Simulation) -> Account {
+        let mut account = self.account;
+        let time = self.acting(simulation);
+        let relaxation: Vector3<f64> = self.laid.relaxation.iter().sum();
+        account.traction += self.given.traction + self.laid.traction * time;
+        account.impedance += self.given.impedance + self.laid.impedance * time;
+        account.relaxation += relaxation * time;
+        account.weight += simulation.gravity() * simulation.free_mass() * time;
+        account
+    }
+
+    /// For how long what is laid has acted and is not booked yet (s).
+    fn acting(&self, simulation: &Simulation) -> f64 {
+        match simulation.steps_done() % self.steps_of_loads {
+            0 => 0.0,
+            steps => self.kick + (steps - 1) as f64 * self.timestep,
+        }
+    }
+
+    /// Momentum that the continuum has still to take from the relaxation (N s).
+    pub fn owed(&self, simulation: &Simulation) -> Vector3<f64> {
+        let time = self.acting(simulation);
+        let forces = self.laid.relaxation.iter().zip(&self.given.relaxation);
+        let all = self.owed.iter().zip(forces);
+        all.map(|(owed, (laid, given))| owed - given - laid * time)
+            .sum()
+    }
+
+    /// What the monitors have seen.
+    pub fn monitors(&self) -> &Monitors {
+        &self.monitors
+    }
+
+    /// Farthest that grains have moved through a face of the box in the mean, outwards positive (m).
+    pub fn farthest_moved(&self) -> f64 {
+        let sizes = self.moved.iter().copied();
+        sizes.fold(
+            0.0,
+            |most: f64, m| if m.abs() > most.abs() { m } else { most },
+        )
+    }
+
+    /// Time between two exchanges (s).
+    pub fn exchange_time(&self) -> f64 {
+        (self.loads_of_exchange * self.steps_of_loads) as f64 * self.timestep
+    }
+
+    /// Exchanges made.
+    pub fn exchanges(&self) -> u64 {
+        self.exchanges
+    }
+
+    /// Whether an exchange has just been made.
+    pub fn at_exchange(&self) -> bool {
+        self.made == 0
+    }
+
+    /// Momentum of the grains, ball included, with what walls have taken (N s).
+    pub fn grain_momentum(&self, simulation: &mut Simulation) -> Vector3<f64> {
+        simulation.leapfrog_momentum() + simulation.wall_impulse()
+    }
+
+    /// Mass of grains over each column of cells (kg).
+    fn column_masses(&self) -> Vec<f64> {
+        let layer = self.layout.cells.counts[0] * self.layout.cells.counts[1];
+        let mut masses = vec![0.0; layer];
+        for row in self.sums.cover.chunks_exact(layer) {
+            for (mass, cover) in masses.iter_mut().zip(row) {
+                *mass += cover.mass;
+            }
+        }
+        masses
+    }
+
+    /// Mass of a cell full of continuum (kg).
+    fn full(&self) -> f64 {
+        self.spec.density() * self.layout.cells.volume()
+    }
+
+    /// Mass of the continuum behind the handshake surface (kg).
+    pub fn continuum_mass(&self) -> f64 {
+        let Layout {
+            cells,
+            zone,
+            widths,
+            ..
+        } = &self.layout;
+        let fractions = self.flow.state().fractions.iter().enumerate();
+        let behind =
+            fractions.filter(|(cell, _)| zone.label_of_cell(cells.index(*cell)) < widths[0]);
+        self.full() * behind.map(|(_, f)| f).sum::<f64>()
+    }
+
+    /// Mass of grains inside the handshake surface and of continuum outside it over that of the bed, less 1.
+    pub fn mass_error(&self, simulation: &Simulation) -> f64 {
+        let Layout {
+            cells,
+            zone,
+            widths,
+            ..
+        } = &self.layout;
+        let ball = self.spec.ball;
+        let mut masses: Vec<(u32, f64)> = simulation
+            .held(|at| zone.label(cells, at) > widths[0])
+            .filter(|g| !g.fixed && Some(g.id) != ball)
+            .map(|g| (g.id, g.mass))
+            .collect();
+        masses.sort_unstable_by_key(|m| m.0);
+        let grains: f64 = masses.iter().map(|m| m.1).sum();
+        (grains + self.continuum_mass()) / self.account.mass - 1.0
+    }
+
+    /// ρ U L³ (N s).
+    fn impulse_unit(&self) -> f64 {
+        self.units.density * self.units.velocity * self.units.length.powi(3)
+    }
+}

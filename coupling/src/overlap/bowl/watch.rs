@@ -1,0 +1,64 @@
+//! What the monitors look at after every exchange.
+
+use super::Bowl;
+
+/// How far beyond the box a grain has escaped, in diameters.
+const ESCAPED: f64 = 1.0;
+
+impl Bowl {
+    /// Sums |impulses| of what the grains were given.
+    pub(super) fn watch_impulses(&mut self) {
+        let relaxation: f64 = self.given.relaxation.iter().map(|f| f.norm()).sum();
+        let traction: f64 = self.held.traction.iter().map(|f| f.norm()).sum();
+        self.monitors.impulse[0] += relaxation;
+        self.monitors.impulse[1] += traction * self.exchange_time();
+    }
+
+    /// Looks at both sides of the handshake surface, after a time (s).
+    pub(super) fn watch(&mut self, dt: f64) {
+        let (cells, zone) = (&self.layout.cells, &self.layout.zone);
+        let (mut slips, mut weights) = (0.0, 0.0);
+        let mut force = [0.0; 2];
+        for face in &self.handshake.all {
+            let axis = zone.sides[face.side].axis;
+            let Some((fraction, stress, _)) = self.view.between(face.cells) else {
+                continue;
+            };
+            let area = fraction * cells.face_area(axis);
+            force[1] -= area * stress[(axis, axis)];
+            for cell in face.cells {
+                force[0] -= 0.5 * area * self.sums.stress[cell][(axis, axis)];
+                let cover = &self.sums.cover[cell];
+                let mass = cover.buffer + cover.inner;
+                if mass > 0.0 {
+                    let slip = (cover.buffer_slip + cover.inner_slip) / mass;
+                    weights += mass;
+                    slips += mass * slip.norm_squared();
+                }
+            }
+        }
+        let slip = if weights > 0.0 {
+            f64::sqrt(slips / weights)
+        } else {
+            0.0
+        };
+        let beyond = -ESCAPED * self.spec.law.diameter / self.spec.settings.cell;
+        let belongs = self.spec.belongs();
+        let escaped = self.sighting.snapshot.grains.iter();
+        let escaped = escaped.filter(|g| belongs(g) && zone.label(cells, &g.position) < beyond);
+        let escaped = escaped.count() as f64;
+        for (moved, face) in self.moved.iter_mut().zip(&self.faces.all) {
+            let side = &zone.sides[face.side];
+            let [_, inside] = face.cells;
+            *moved += side.outwards * self.sums.cover[inside].velocity()[side.axis] * dt;
+        }
+        let m = &mut self.monitors;
+        m.exchanges += 1.0;
+        m.slip += slip;
+        m.largest_slip = m.largest_slip.max(slip);
+        for (sum, force) in m.force.iter_mut().zip(force) {
+            *sum += force;
+        }
+        m.escaped = m.escaped.max(escaped);
+    }
+}

@@ -1,0 +1,496 @@
+//! A bed that is grains about the ball and a continuum beyond.
+//!
+//! The whole bed is settled as grains, the same as with `model = "dem"`; at the start what lies beyond the box becomes
+//! continuum (`coupling::overlap::bowl`). Preparation, walls, ball and step are those of the bed of grains.
+
+use super::super::world::{Course, Expected, Ran, Recipe, Workshop, World};
+use crate::failure::Failure;
+use crate::rheology_file::RheologyFile;
+use crate::scene::world::{Materials, OutputKeys, StepKeys};
+use crate::scene::{BallImpactScene, LawKeys};
+use crate::state_hash;
+use crate::summary::{Quantity, Summary};
+use crate::table::Table;
+use colluvium_continuum::free_surface::SurfaceOptions;
+use colluvium_continuum::rheology::MuI;
+use colluvium_coupling::overlap::OverlapError;
+use colluvium_coupling::overlap::bowl::{Bowl, BowlSpec};
+use colluvium_dem::preparation::{Packing, solid_fraction};
+use colluvium_dem::{Simulation, Snapshot};
+use std::path::Path;
+use std::sync::{Mutex, MutexGuard, PoisonError};
+
+/// Limits of the monitors: slip over the ball's speed, ratio of forces less 1.
+const MOST_SLIP: f64 = 0.01;
+const MOST_RATIO: f64 = 0.05;
+/// Numbers in front of the bowl's in the memory: solid fraction and surface of the bed.
+const HEAD: usize = 2;
+
+/// A bed, and what is alive of it while it runs.
+pub struct JoinedBed<'a> {
+    scene: &'a BallImpactScene,
+    origin: String,
+    live: Mutex<Option<Bowl>>,
+}
+
+impl std::fmt::Debug for JoinedBed<'_> {
+    fn fmt(&self, f: &mut std::fmt::Formatter<'_>) -> std::fmt::Result {
+        write!(f, "a joined bed of {}", self.origin)
+    }
+}
+
+/// What an error of the coupling means for the process.
+fn failure(error: OverlapError) -> Failure {
+    match error {
+        OverlapError::OutOfRange { .. } | OverlapError::Record(_) => {
+            Failure::Input(error.to_string())
+        }
+        error => Failure::Run(error.to_string()),
+    }
+}
+
+impl<'a> JoinedBed<'a> {
+    /// Before anything runs.
+    pub fn new(scene: &'a BallImpactScene, origin: &str) -> Self {
+        Self {
+            scene,
+            origin: origin.to_owned(),
+            live: Mutex::new(None),
+        }
+    }
+
+    /// The law of the continuum at a solid fraction.
+    fn law(&self, solid_fraction: f64) -> Result<MuI, Failure> {
+        let keys = &self.scene.continuum;
+        let materials = self.scene.materials(&self.origin)?;
+        let calibrated = match keys.calibrated.word() {
+            Some(word) => {
+                let file = RheologyFile::read(Path::new(word))?;
+                [file.mu_s, file.mu_2, file.i_0]
+            }
+            None => [f64::NAN; 3],
+        };
+        Ok(MuI {
+            mu_s: keys.mu_s.unwrap_or(calibrated[0]),
+            mu_2: keys.mu_2.unwrap_or(calibrated[1]),
+            i_0: keys.i_0.unwrap_or(calibrated[2]),
+            diameter: self.scene.grain_diameter(&materials),
+            solid_fraction,
+            grain_density: self.scene.grain_density(&materials),
+            cohesion: 0.0,
+        })
+    }
+
+    /// What the bed is joined from, at a solid fraction and with its surface at a height (m).
+    fn spec(&self, [solid, surface]: [f64; HEAD], ball: u32) -> Result<BowlSpec, Failure> {
+        let scene = self.scene;
+        let law = self.law(solid)?;
+        let size = [scene.container.length, scene.container.width].map(|e| scene.scale * e);
+        let half = scene.half_width(law.diameter);
+        Ok(BowlSpec {
+            low: [-0.5 * size[0], -0.5 * size[1], scene.floor()],
+            size,
+            gravity: scene.gravity,
+            options: SurfaceOptions::default(),
+            half: [half; 2],
+            bottom: (surface - scene.zone_depth(law.diameter) - scene.floor()).max(0.0),
+            settings: scene.overlap_settings(&self.origin)?,
+            ball: Some(ball),
+            law,
+        })
+    }
+
+    fn live(&self) -> MutexGuard<'_, Option<Bowl>> {
+        self.live.lock().unwrap_or_else(PoisonError::into_inner)
+    }
+
+    fn recalled(&self, simulation: &Simulation, memory: &[f64]) -> Result<Bowl, Failure> {
+        let damaged = || Failure::Input("--resume: the checkpoint is damaged: recipe/state".into());
+        let (head, rest) = memory.split_first_chunk::<HEAD>().ok_or_else(damaged)?;
+        let spec = self.spec(*head, last(simulation))?;
+        Bowl::read(spec, rest, simulation).map_err(failure)
+    }
+
+    /// Cuts the bed.
+    fn begin(&self, simulation: &mut Simulation) -> Result<([f64; HEAD], Bowl), Failure> {
+        let ball = last(simulation);
+        let mut bed = simulation.grain_list();
+        // The ball joined last.
+        bed.pop();
+        let solid = solid_fraction(&bed, simulation.domain(), &self.scene.middle(&bed));
+        let head = [solid, self.scene.surface(&bed)];
+        let bowl = Bowl::cut(self.spec(head, ball)?, simulation).map_err(failure)?;
+        Ok((head, bowl))
+    }
+
+    fn remember(head: &[f64], bowl: &Bowl, state: &mut Vec<f64>) {
+        let mut memory = Vec::with_capacity(state.len());
+        memory.extend(head);
+        bowl.write(&mut memory);
+        *state = memory;
+    }
+
+    /// Share of the bed's volume that stays grains.
+    fn expected_share(&self) -> f64 {
+        let scene = self.scene;
+        let Ok(materials) = scene.materials(&self.origin) else {
+            return 1.0;
+        };
+        let d = scene.grain_diameter(&materials);
+        let half = scene.half_width(d);
+        let edges = [scene.container.length, scene.container.width].map(|e| 0.5 * scene.scale * e);
+        let across: f64 = edges.iter().map(|edge| (half / edge).min(1.0)).product();
+        let volume = scene.count() as f64 * std::f64::consts::PI / 6.0 * d.powi(3);
+        let depth = volume / crate::scene::DENSE / (4.0 * edges[0] * edges[1]);
+        across * (scene.zone_depth(d) / depth).min(1.0)
+    }
+}
+
+/// Number of the ball: it joined last.
+fn last(simulation: &Simulation) -> u32 {
+    simulation.held(|_| true).map(|g| g.id).max().unwrap_or(0)
+}
+
+impl Recipe for JoinedBed<'_> {
+    fn about(&self) -> String {
+        format!(
+            "{}; beyond a box about the ball the bed is a continuum",
+            self.scene.about()
+        )
+    }
+
+    fn materials(&self, origin: &str) -> Result<Materials, Failure> {
+        Recipe::materials(self.scene, origin)
+    }
+
+    fn contact(&self) -> &LawKeys {
+        self.scene.contact()
+    }
+
+    fn seed(&self) -> u64 {
+        self.scene.seed()
+    }
+
+    fn coarse_graining(&self) -> f64 {
+        self.scene.coarse_graining()
+    }
+
+    fn step(&self) -> &StepKeys {
+        self.scene.step()
+    }
+
+    fn output(&self) -> &OutputKeys {
+        self.scene.output()
+    }
+
+    fn packing(&self) -> Option<&str> {
+        self.scene.packing()
+    }
+
+    fn provenance(&self) -> Option<toml::Table> {
+        self.scene.provenance()
+    }
+
+    fn prepare(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure> {
+        self.scene.prepare(shop, origin)
+    }
+
+    fn world(
+        &self,
+        packing: &Packing,
+        materials: &Materials,
+        origin: &str,
+    ) -> Result<World, Failure> {
+        self.scene.world(packing, materials, origin)
+    }
+
+    fn expected(&self, materials: &Materials) -> Expected {
+        let all = self.scene.expected(materials);
+        Expected {
+            grains: all.grains * self.expected_share(),
+            ..all
+        }
+    }
+
+    fn left_out(&self) -> Vec<&'static str> {
+        let mut own = self.scene.left_out();
+        own.extend([
+            "granular temperature, dilatancy and compaction of the continuum",
+            "spins across the box",
+            "exchange of mass through the box (it stays, and little moves there)",
+            "friction of the container's side walls on the continuum, slip on its floor",
+        ]);
+        own
+    }
+
+    fn plan(&self) -> Vec<(String, String)> {
+        let mut lines = self.scene.plan();
+        let scene = self.scene;
+        let (Ok(materials), Ok(s)) = (
+            scene.materials(&self.origin),
+            scene.overlap_settings(&self.origin),
+        ) else {
+            return lines;
+        };
+        let d = scene.grain_diameter(&materials);
+        let why = |given: Option<f64>| match given {
+            Some(_) => "given",
+            None => "computed",
+        };
+        lines.push((
+            "zones".into(),
+            format!(
+                "grains within {:.4} m ({:.1} d; zones.half_width {}) of the axis along x and y and {:.4} m ({:.1} d; zones.depth {}) \
+                 below the surface, continuum beyond; {:.0} % of the grain-steps of a bed of grains",
+                scene.half_width(d),
+                scene.half_width(d) / d,
+                why(scene.zones.half_width),
+                scene.zone_depth(d),
+                scene.zone_depth(d) / d,
+                why(scene.zones.depth),
+                100.0 * self.expected_share()
+            ),
+        ));
+        lines.push((
+            "overlap".into(),
+            format!(
+                "from the box's sides inwards: shell {:.1} d, buffer {:.1} d, inner overlap {:.1} d; loads held {:.2e} s, exchange every \
+                 {:.2e} s, stresses averaged over {:.2e} s, relaxation {:.2e} s, following {:.2e} s, impedance {:.3e} Pa s/m",
+                s.shell / d,
+                s.buffer / d,
+                s.inner / d,
+                s.load_time,
+                s.exchange_time,
+                s.stress_time,
+                s.relaxation_time,
+                s.following_time,
+                s.impedance
+            ),
+        ));
+        let law = scene.continuum.calibrated.word().unwrap_or("none");
+        lines.push((
+            "continuum".into(),
+            format!(
+                "in space, the law calibrated for `{law}` (|τ|/p), cells of about {:.1} d",
+                scene.zones.cell_diameters
+            ),
+        ));
+        lines
+    }
+
+    fn steer_every(&self, timestep: f64) -> u64 {
+        let settings = self.scene.overlap_settings(&self.origin);
+        settings.map_or(u64::MAX, |s| Bowl::steps_of_loads(&s, timestep))
+    }
+
+    fn steer(&self, simulation: &mut Simulation, state: &mut Vec<f64>) -> Result<Course, Failure> {
+        let mut guard = self.live();
+        if state.is_empty() {
+            let (head, bowl) = self.begin(simulation)?;
+            Self::remember(&head, &bowl, state);
+            *guard = Some(bowl);
+            return Ok(Course::On);
+        }
+        if guard.is_none() {
+            *guard = Some(self.recalled(simulation, state)?);
+        }
+        let Some(bowl) = guard.as_mut() else {
+            return Ok(Course::On);
+        };
+        bowl.go_on(simulation).map_err(failure)?;
+        if bowl.at_exchange() {
+            let head = [state[0], state[1]];
+            Self::remember(&head, bowl, state);
+        } else {
+            bowl.write_over(&mut state[HEAD..]);
+        }
+        Ok(Course::On)
+    }
+
+    fn columns(&self) -> Vec<(String, &'static str)> {
+        self.scene.columns()
+    }
+
+    fn look(&self, simulation: &mut Simulation, seen: &Snapshot, state: &[f64]) -> Vec<f64> {
+        self.scene.look(simulation, seen, state)
+    }
+
+    fn conclude(&self, ran: &mut Ran, summary: &mut Summary) -> Result<Vec<Table>, Failure> {
+        let mut tables = self.scene.conclude(ran, summary)?;
+        let bowl = self.recalled(&ran.simulation, &ran.state)?;
+        self.book(ran, &bowl, summary);
+        self.watch(&bowl, summary);
+        summary.state_hash = state_hash::of_hashes(
+            [ran.simulation.state_hash(), state_hash::of(&[&ran.state])]
+                .iter()
+                .map(String::as_str),
+        );
+        tables.push(cells(&bowl));
+        Ok(tables)
+    }
+
+    fn compared(&self) -> Vec<&'static str> {
+        self.scene.compared()
+    }
+}
+
+impl JoinedBed<'_> {
+    /// Cost, mass and momentum.
+    fn book(&self, ran: &mut Ran, bowl: &Bowl, summary: &mut Summary) {
+        let steps = ran.simulation.steps_done();
+        let before = ran.packing.grains.len() + 1;
+        let monitors = bowl.monitors();
+        let counted = summary.cost.grain_steps.min(steps * before as u64);
+        summary.cost.grain_steps += monitors.grain_steps as u64;
+        summary.cost.grain_steps -= counted;
+        summary.cost.cell_steps = monitors.steps[1] as u64;
+        if summary.cost.wall_s > 0.0 {
+            summary.cost.grain_steps_per_s = summary.cost.grain_steps as f64 / summary.cost.wall_s;
+            summary.cost.cell_steps_per_s = monitors.steps[1] / summary.cost.wall_s;
+        }
+        summary.model.grains = ran.simulation.grain_count() as u64;
+        summary.model.cells = bowl.cells().count() as u64;
+        let one = |value: f64| Quantity::new(value, "1");
+        let share = monitors.grain_steps / (steps * before as u64) as f64;
+        summary.put(
+            "grain_steps_share",
+            one(share).from("grain-steps of the run over those of the whole bed"),
+        );
+        let account = bowl.account(&ran.simulation);
+        let grains = account.grains_error(bowl.grain_momentum(&mut ran.simulation));
+        let exchange = account.exchange_error(bowl.owed(&ran.simulation));
+        summary.ledger.momentum_relative = Some(grains.max(exchange));
+        for (name, value, source) in [
+            (
+                "handshake_mass",
+                bowl.mass_error(&ran.simulation),
+                "mass of grains and continuum on their sides of the handshake surface over that of the bed, less 1",
+            ),
+            (
+                "ledger_grains",
+                grains,
+                "momentum of grains and ball against its account, relative to the largest entry",
+            ),
+            (
+                "ledger_exchange",
+                exchange,
+                "what the relaxation gave to both sides, relative to the largest entry",
+            ),
+        ] {
+            summary.put(name, one(value).against(0.0, source));
+        }
+        for (name, impulse, source) in [
+            ("weight", account.weight, "of grains and ball"),
+            (
+                "traction",
+                account.traction,
+                "of the continuum on the grains",
+            ),
+            ("impedance", account.impedance, "on the grains"),
+            (
+                "relaxation",
+                account.relaxation,
+                "on the grains; the continuum takes the opposite",
+            ),
+        ] {
+            let name = format!("impulse_{name}_z");
+            summary.put(&name, Quantity::new(impulse.z, "N s").from(source));
+        }
+    }
+
+    /// What the monitors say, and in words what they should not.
+    fn watch(&self, bowl: &Bowl, summary: &mut Summary) {
+        let monitors = bowl.monitors();
+        let d = bowl.spec().law.diameter;
+        let slip = monitors.mean_slip() / self.scene.speed;
+        let ratio = monitors.force_ratio();
+        for (name, value, right, source) in [
+            (
+                "slip",
+                slip,
+                0.0,
+                "rms difference of mean velocities at the handshake surface over the ball's speed, mean in time; to be below 1 %",
+            ),
+            (
+                "largest_slip",
+                monitors.largest_slip / self.scene.speed,
+                0.0,
+                "the same, at its largest",
+            ),
+            (
+                "force_ratio",
+                ratio,
+                1.0,
+                "of normal forces through the handshake surface, grains over continuum, means in time; to be within 5 %",
+            ),
+            (
+                "relaxation_share",
+                monitors.relaxation_share(),
+                0.0,
+                "impulse of the relaxation over that of the traction",
+            ),
+            (
+                "grains_escaped",
+                monitors.escaped,
+                0.0,
+                "most grains beyond the box by more than a diameter, at any exchange",
+            ),
+            (
+                "box_moved",
+                bowl.farthest_moved() / d,
+                0.0,
+                "farthest mean way of grains through a face of the box, outwards, in diameters: it should be small",
+            ),
+        ] {
+            summary.put(name, Quantity::new(value, "1").against(right, source));
+        }
+        summary.put(
+            "newton_iterations",
+            Quantity::new(monitors.iterations / monitors.steps[0], "1")
+                .from("of the continuum, a step"),
+        );
+        summary.put(
+            "momentum_residual",
+            Quantity::new(monitors.residual, "1").from("of the continuum, largest of any step"),
+        );
+        let misses = [
+            (slip > MOST_SLIP, "the slip", slip),
+            (
+                (ratio - 1.0).abs() > MOST_RATIO,
+                "the ratio of forces",
+                ratio,
+            ),
+            (
+                monitors.escaped > 0.0,
+                "the number of grains beyond the box",
+                monitors.escaped,
+            ),
+        ];
+        for (_, what, value) in misses.into_iter().filter(|(misses, ..)| *misses) {
+            summary
+                .remarks
+                .push(format!("Overlap: {what} is {value:.4}, outside its limit."));
+        }
+    }
+}
+
+/// Cells of the continuum at the end.
+fn cells(bowl: &Bowl) -> Table {
+    let fields = bowl.fields();
+    let column = |f: &dyn Fn(&colluvium_continuum::free_surface::SpaceFields) -> f64| {
+        fields.iter().map(f).collect::<Vec<f64>>()
+    };
+    let mut table = Table::new("continuum");
+    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+        table = table.with(
+            name,
+            "m",
+            column(&|c| 0.5 * (c.lower[axis] + c.upper[axis])),
+        );
+    }
+    table = table.with("fraction", "1", column(&|c| c.fraction));
+    for (axis, name) in ["u", "v", "w"].into_iter().enumerate() {
+        table = table.with(name, "m/s", column(&|c| c.velocity[axis]));
+    }
+    table.with("p", "Pa", column(&|c| c.pressure))
+}

@@ -1,0 +1,179 @@
+//! Keys of a bed that is grains about the ball and a continuum beyond, of `ball-impact` with `model = "hybrid"`.
+
+use super::SceneError;
+use super::ball_impact::{BallImpactScene, BallModel};
+use super::collapse_grains::CalibratedKind;
+use super::collapse_zones::DENSE;
+use super::world::{Materials, Place};
+use colluvium_coupling::overlap::{Resolved, Scales};
+use schemars::JsonSchema;
+use serde::{Deserialize, Serialize};
+
+/// Diameters of grains between the ball and the overlap, where nobody says how wide the box is.
+const AROUND: f64 = 4.0;
+/// Diameters of the ball between the surface and the overlap, where nobody says how deep the box is.
+const UNDER: f64 = 2.0;
+/// Times d/v of which all times of the overlap are parts: waves cross a grain many times in it.
+const TIME: f64 = 2.0;
+
+/// Where grains stay, at scale 1. What is left out is computed; `colluvium plan` says it.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BallZoneKeys {
+    /// Half of the box's edges along x and y, about the axis (m).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
+    pub half_width: Option<f64>,
+    /// Depth of its bottom below the surface of the bed (m).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
+    pub depth: Option<f64>,
+    /// Edge of the continuum's cells in diameters of the grains, about: whole cells fill the container.
+    #[serde(default = "three")]
+    #[schemars(extend("minimum" = 0.5, "maximum" = 100.0))]
+    pub cell_diameters: f64,
+}
+
+fn three() -> f64 {
+    3.0
+}
+
+impl Default for BallZoneKeys {
+    fn default() -> Self {
+        Self {
+            half_width: None,
+            depth: None,
+            cell_diameters: three(),
+        }
+    }
+}
+
+/// The law of the continuum around the grains.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct BedContinuumKeys {
+    /// The calibrated law that it takes, of grains most like those of the bed.
+    pub calibrated: CalibratedKind,
+    /// Friction μ_s at I → 0, in place of the calibrated one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minimum" = 0.0, "maximum" = 5.0))]
+    pub mu_s: Option<f64>,
+    /// Friction μ_2 at I → ∞, in place of the calibrated one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0))]
+    pub mu_2: Option<f64>,
+    /// Inertial number I_0 half way between, in place of the calibrated one.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 100.0))]
+    pub i_0: Option<f64>,
+}
+
+impl Default for BedContinuumKeys {
+    fn default() -> Self {
+        Self {
+            calibrated: CalibratedKind::Glass,
+            mu_s: None,
+            mu_2: None,
+            i_0: None,
+        }
+    }
+}
+
+impl BallImpactScene {
+    /// Mean diameter of the bed's grains by volume (m).
+    pub fn grain_diameter(&self, materials: &Materials) -> f64 {
+        let volumes = materials.ingredients.iter();
+        let parts: f64 = volumes.clone().map(|i| i.parts_by_volume).sum();
+        let mean = volumes.map(|i| i.parts_by_volume * 2.0 * i.sizes.mean());
+        mean.sum::<f64>() / parts
+    }
+
+    /// Density of the bed's grains by volume (kg/m³).
+    pub fn grain_density(&self, materials: &Materials) -> f64 {
+        let volumes = materials.ingredients.iter();
+        let parts: f64 = volumes.clone().map(|i| i.parts_by_volume).sum();
+        volumes.map(|i| i.parts_by_volume * i.density).sum::<f64>() / parts
+    }
+
+    /// Width of the overlap (m).
+    fn overlap_width(&self, diameter: f64) -> f64 {
+        let widths = [self.overlap.inner_diameters, self.overlap.buffer_diameters];
+        widths.iter().map(|w| w.unwrap_or(3.0) * diameter).sum()
+    }
+
+    /// Half of the box's edges along x and y (m), given or computed.
+    pub fn half_width(&self, diameter: f64) -> f64 {
+        match self.zones.half_width {
+            Some(given) => self.scale * given,
+            None => self.ball_radius() + AROUND * diameter + self.overlap_width(diameter),
+        }
+    }
+
+    /// Depth of its bottom below the surface (m), given or computed.
+    pub fn zone_depth(&self, diameter: f64) -> f64 {
+        match self.zones.depth {
+            Some(given) => self.scale * given,
+            None => 2.0 * UNDER * self.ball_radius() + self.overlap_width(diameter),
+        }
+    }
+
+    /// The overlap's settings with nothing left out.
+    pub fn overlap_settings(&self, origin: &str) -> Result<Resolved, SceneError> {
+        let materials = self.materials(origin)?;
+        let (d, rho) = (
+            self.grain_diameter(&materials),
+            DENSE * self.grain_density(&materials),
+        );
+        let law = materials.first_law();
+        // Springs are as stiff as under the pressure of the impact, F = ½ ρ v² d²/φ on a contact.
+        let force = 0.5 * rho * self.speed.powi(2) * d * d / DENSE;
+        let stiffness = match law.normal.elastic_modulus() {
+            Some(modulus) => (6.0 * modulus * modulus * 0.25 * d * force).cbrt(),
+            None => law.stiffness(0.25 * d, 0.0).normal,
+        };
+        let scales = Scales {
+            diameter: d,
+            time: TIME * d / self.speed,
+            density: rho,
+            stiffness,
+        };
+        let mut settings = self.overlap.settings(d, scales.time);
+        settings.cell = Some(self.zones.cell_diameters * d);
+        super::collapse_zones::resolved(&settings, &scales, origin)
+    }
+
+    /// What a joined bed needs beyond one of grains.
+    pub(super) fn check_zones(&self, origin: &str) -> Result<(), SceneError> {
+        let at = |section| Place { origin, section };
+        if self.model == BallModel::Dem {
+            return Ok(());
+        }
+        let materials = self.materials(origin)?;
+        self.overlap_settings(origin)?;
+        if self.continuum.calibrated.word().is_none() {
+            let range = "moderate, gravel or glass: the continuum needs a law";
+            return Err(at("continuum").refuse("calibrated", "none", range));
+        }
+        let d = self.grain_diameter(&materials);
+        let [half, depth] = [self.half_width(d), self.zone_depth(d)];
+        let overlap = self.overlap_width(d);
+        for (key, value, least) in [
+            ("half_width", half, self.ball_radius() + overlap),
+            ("depth", depth, overlap),
+        ] {
+            if value <= least {
+                let range = format!("above {}: the overlap lies inside it", least / self.scale);
+                return Err(at("zones").refuse(key, value / self.scale, range));
+            }
+        }
+        let edges = [self.container.length, self.container.width].map(|e| 0.5 * self.scale * e);
+        if edges.iter().all(|edge| half >= *edge) {
+            let range = format!(
+                "below {}: beyond it lies the continuum",
+                edges.iter().fold(0.0, |most: f64, e| most.max(*e)) / self.scale
+            );
+            return Err(at("zones").refuse("half_width", half / self.scale, range));
+        }
+        Ok(())
+    }
+}
