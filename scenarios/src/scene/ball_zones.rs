@@ -53,6 +53,7 @@ impl Default for BallZoneKeys {
 #[serde(deny_unknown_fields)]
 pub struct BedContinuumKeys {
     /// The calibrated law that it takes, of grains most like those of the bed.
+    #[serde(default = "glass")]
     pub calibrated: CalibratedKind,
     /// Friction μ_s at I → 0, in place of the calibrated one.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -68,10 +69,14 @@ pub struct BedContinuumKeys {
     pub i_0: Option<f64>,
 }
 
+fn glass() -> CalibratedKind {
+    CalibratedKind::Glass
+}
+
 impl Default for BedContinuumKeys {
     fn default() -> Self {
         Self {
-            calibrated: CalibratedKind::Glass,
+            calibrated: glass(),
             mu_s: None,
             mu_2: None,
             i_0: None,
@@ -150,8 +155,11 @@ impl BallImpactScene {
         }
         let materials = self.materials(origin)?;
         self.overlap_settings(origin)?;
-        if self.continuum.calibrated.word().is_none() {
-            let range = "moderate, gravel or glass: the continuum needs a law";
+        let keys = &self.continuum;
+        let own = [keys.mu_s, keys.mu_2, keys.i_0];
+        if keys.calibrated.word().is_none() && own.iter().any(Option::is_none) {
+            let range =
+                "moderate, gravel or glass, or mu_s, mu_2 and i_0 given: the continuum needs a law";
             return Err(at("continuum").refuse("calibrated", "none", range));
         }
         let d = self.grain_diameter(&materials);

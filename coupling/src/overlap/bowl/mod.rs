@@ -231,6 +231,8 @@ pub struct Bowl {
     /// Faces of the handshake surface.
     handshake: Faces,
     flow: SpaceFlow<MuI>,
+    /// Its volume at the start, in its own unit.
+    start_volume: f64,
     /// Mass of grains over each column of cells at the start (kg).
     columns: Vec<f64>,
     sums: Sums,
@@ -320,6 +322,7 @@ impl Bowl {
         let (count, sides) = (cells.count(), faces.all.len());
         Ok(Self {
             units,
+            start_volume: flow.volume(),
             flow,
             columns: Vec::new(),
             sums: Sums::nothing(cells),
@@ -488,6 +491,11 @@ impl Bowl {
         let behind =
             fractions.filter(|(cell, _)| zone.label_of_cell(cells.index(*cell)) < widths[0]);
         self.full() * behind.map(|(_, f)| f).sum::<f64>()
+    }
+
+    /// Error of the continuum's volume against what it began with and its copy was given since, relative.
+    pub fn volume_error(&self) -> f64 {
+        (self.flow.volume() - self.start_volume - self.account.copied) / self.start_volume
     }
 
     /// Mass of grains inside the handshake surface and of continuum outside it over that of the bed, less 1.

@@ -2,6 +2,8 @@
 
 use super::Bowl;
 
+/// Part of a full cell's mass from which on it is bed.
+const FILLED: f64 = 0.5;
 /// How far beyond the box a grain has escaped, in diameters.
 const ESCAPED: f64 = 1.0;
 
@@ -47,9 +49,14 @@ impl Bowl {
         let escaped = self.sighting.snapshot.grains.iter();
         let escaped = escaped.filter(|g| belongs(g) && zone.label(cells, &g.position) < beyond);
         let escaped = escaped.count() as f64;
+        let filled = FILLED * self.full();
         for (moved, face) in self.moved.iter_mut().zip(&self.faces.all) {
             let side = &zone.sides[face.side];
-            let [_, inside] = face.cells;
+            let [out, inside] = face.cells;
+            // What flies over the bed is no motion of the box.
+            if !self.view.is_full(out) || self.sums.cover[inside].mass < filled {
+                continue;
+            }
             *moved += side.outwards * self.sums.cover[inside].velocity()[side.axis] * dt;
         }
         let m = &mut self.monitors;

@@ -359,6 +359,7 @@ impl JoinedBed<'_> {
         let account = bowl.account(&ran.simulation);
         let grains = account.grains_error(bowl.grain_momentum(&mut ran.simulation));
         let exchange = account.exchange_error(bowl.owed(&ran.simulation));
+        summary.ledger.mass_relative = bowl.volume_error();
         summary.ledger.momentum_relative = Some(grains.max(exchange));
         for (name, value, source) in [
             (

@@ -1,0 +1,168 @@
+//! A ball that falls into grains with a continuum around them, from the command line.
+
+#![allow(clippy::unwrap_used)] // a test may panic
+
+mod command;
+
+use command::{colluvium, hash, succeed, summary, table, value};
+use std::path::Path;
+use std::process::{Command, Stdio};
+
+/// A bed of 3 800 soft grains, 17 diameters wide and 12 deep.
+const BED: [&str; 13] = [
+    "scale=1",
+    "speed=2",
+    "duration=0.02",
+    "ball.radius=0.0025",
+    "ball.height=0.004",
+    "container.length=0.034",
+    "container.width=0.034",
+    "container.floor=-0.026",
+    "container.grains=3800",
+    "contact.youngs_modulus=1e7",
+    "surfaces.steel.contact.youngs_modulus=1e8",
+    "output.pictures=0",
+    "packing=bed",
+];
+
+/// Grains in a box half as large, in an overlap of four diameters.
+const BOWL: [&str; 7] = [
+    "model=hybrid",
+    "overlap.inner_diameters=2",
+    "overlap.buffer_diameters=2",
+    "overlap.shell_diameters=1.5",
+    "zones.cell_diameters=2",
+    "zones.half_width=0.0125",
+    "zones.depth=0.013",
+];
+
+fn arguments<'a>(out: &'a str, sets: &[&'a str]) -> Vec<&'a str> {
+    let mut list = vec!["run", "ball-impact", "--out", out];
+    for set in BED.iter().chain(sets) {
+        list.extend(["--set", set]);
+    }
+    list
+}
+
+fn joined<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+    let sets: Vec<&str> = BOWL.iter().chain(more).copied().collect();
+    arguments(out, &sets)
+}
+
+/// Largest distance between two balls' heights, over how deep the first one goes.
+fn apart(folder: &Path, names: [&str; 2]) -> f64 {
+    let [one, other] = names.map(|name| table(&folder.join(name).join("ball.csv")).1);
+    assert_eq!(one.len(), other.len());
+    let pairs = one.iter().zip(&other);
+    let miss = pairs.map(|(a, b)| (a[1] - b[1]).abs()).fold(0.0, f64::max);
+    miss / value(&summary(&folder.join(names[0])), "penetration")
+}
+
+/// Of the same settled bed: all grains, joined with one thread and with two, and with nothing exchanged. The ball in the
+/// joined bed goes the way it goes in grains alone; grains that nothing holds let it fall twice as deep.
+#[test]
+fn a_ball_sinks_into_a_joined_bed_as_into_grains() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    succeed(folder.path(), &arguments("grains", &[]));
+    for (name, threads) in [("joined", "1"), ("two", "2")] {
+        let mut run = joined(name, &[]);
+        run.extend(["--threads", threads]);
+        succeed(folder.path(), &run);
+    }
+    assert_eq!(hash(&at("joined")), hash(&at("two")));
+    succeed(
+        folder.path(),
+        &joined("control", &["overlap.uncoupled=true"]),
+    );
+    let [grains, joint, control] = ["grains", "joined", "control"].map(|name| summary(&at(name)));
+    for name in [
+        "penetration",
+        "slip",
+        "force_ratio",
+        "box_moved",
+        "grains_escaped",
+        "handshake_mass",
+        "ledger_grains",
+        "ledger_exchange",
+        "grain_steps_share",
+    ] {
+        let all = [&grains, &joint, &control].map(|s| value(s, name));
+        println!(
+            "{name}: grains {:.3e}, joined {:.3e}, control {:.3e}",
+            all[0], all[1], all[2]
+        );
+    }
+    let [with, without] = ["joined", "control"].map(|name| apart(folder.path(), ["grains", name]));
+    println!("ways of the ball apart: joined {with:.4}, nothing exchanged {without:.3}");
+    // Two runs of grains of which one ball starts 0.1 mm higher differ by 0.01.
+    assert!(with < 0.08 && without > 0.5, "{with} {without}");
+    assert!(value(&joint, "slip") < 0.02 && value(&control, "slip") > 0.04);
+    assert_eq!(value(&joint, "grains_escaped"), 0.0);
+    assert!(value(&joint, "box_moved").abs() < 1.0);
+    assert!(value(&joint, "handshake_mass").abs() < 0.03);
+    assert!(value(&joint, "ledger_grains") < 1e-10);
+    assert!(value(&joint, "ledger_exchange") < 1e-10);
+    assert!(joint["ledger"]["mass_relative"].as_f64().unwrap().abs() < 1e-12);
+    assert!(value(&joint, "grain_steps_share") < 0.4);
+}
+
+/// Killed on the way, it goes on to the same bits.
+#[test]
+fn a_joined_bed_goes_on_after_a_kill() {
+    let folder = tempfile::tempdir().unwrap();
+    let short = ["duration=0.012"];
+    succeed(folder.path(), &joined("whole", &short));
+    let mut killed = joined("killed", &short);
+    killed.extend(["--checkpoint-every", "0"]);
+    let mut child = Command::new(env!("CARGO_BIN_EXE_colluvium"))
+        .args(&killed)
+        .current_dir(folder.path())
+        .stdout(Stdio::null())
+        .spawn()
+        .unwrap();
+    let checkpoint = folder.path().join("killed/checkpoint.h5");
+    while !checkpoint.exists() && child.try_wait().unwrap().is_none() {}
+    child.kill().unwrap();
+    child.wait().unwrap();
+    assert!(checkpoint.exists(), "it was done before it was killed");
+    killed.push("--resume");
+    succeed(folder.path(), &killed);
+    let [whole, resumed] = ["whole", "killed"].map(|name| hash(&folder.path().join(name)));
+    assert_eq!(whole, resumed);
+}
+
+#[test]
+fn bad_joined_beds_are_refused_by_key() {
+    let folder = tempfile::tempdir().unwrap();
+    for (sets, key, allowed) in [
+        (&["zones.half_width=0.009"][..], "zones.half_width", "above"),
+        (&["zones.half_width=0.02"], "zones.half_width", "below"),
+        (&["zones.depth=0.005"], "zones.depth", "above"),
+        (
+            &["zones.cell_diameters=3"],
+            "zones.cell_diameters",
+            "at most the widths",
+        ),
+        (
+            &["continuum.calibrated=none"],
+            "continuum.calibrated",
+            "needs a law",
+        ),
+        (
+            &["overlap.load_time=1"],
+            "overlap.load_time",
+            "at most the time",
+        ),
+        (&["zones.edge_scaled=1"], "zones.edge_scaled", "zones"),
+    ] {
+        let refused = colluvium(folder.path(), &joined("x", sets));
+        let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert_eq!(refused.status.code(), Some(2), "{sets:?}: {message}");
+        assert!(
+            message.contains(key) && message.contains(allowed),
+            "{sets:?}: {message}"
+        );
+        assert!(!folder.path().join("x").exists());
+    }
+}
