@@ -132,6 +132,22 @@ fn a_joined_bed_goes_on_after_a_kill() {
     assert_eq!(whole, resumed);
 }
 
+/// Where a side of the box lies in the ball's way, the run ends when the ball comes to it, and says so.
+#[test]
+fn a_ball_that_comes_to_the_overlap_ends_the_run() {
+    let folder = tempfile::tempdir().unwrap();
+    succeed(
+        folder.path(),
+        &joined("fast", &["speed=8", "ball.density=20000"]),
+    );
+    let found = summary(&folder.path().join("fast"));
+    assert!(value(&found, "overlap_clearance") <= 0.0);
+    let (_, rows) = table(&folder.path().join("fast/ball.csv"));
+    assert!(rows.last().unwrap()[0] < 0.01, "{:?}", rows.last());
+    let remarks = found["remarks"].to_string();
+    assert!(remarks.contains("zones.depth"), "{remarks}");
+}
+
 #[test]
 fn bad_joined_beds_are_refused_by_key() {
     let folder = tempfile::tempdir().unwrap();

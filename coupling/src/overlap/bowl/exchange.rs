@@ -10,8 +10,6 @@ use nalgebra::Vector3;
 const COVERS: [f64; 2] = [0.4, 0.7];
 /// Cells with less of the mass of a full one are not spoken for by their grains.
 const LEAST_COVER: f64 = 0.3;
-/// Faces with less than this of a full shell hand on what presses on them: a force on few grains throws them out.
-const LEAST_SHELL: f64 = 0.3;
 /// Part of a full cell's mass from which on the mean velocity of its buffer is one.
 const LEAST_BUFFER: f64 = 0.1;
 
@@ -107,14 +105,14 @@ impl Bowl {
         // Rows may stand in another order after a restart, and sums over them end in other bits.
         scratch.near.sort_unstable_by_key(|grain| grain.id);
         self.weigh(&mut scratch);
-        let least = self.press_on_shell(&mut scratch.shell);
+        self.press_on_shell(&mut scratch.shell);
         let cells = self.layout.cells;
         scratch.loads.clear();
         for grain in &scratch.near {
             let mut force = Vector3::zeros();
             for (face, part) in self.shares(grain) {
                 let shell = &scratch.shell[face];
-                if shell.weight > least[self.faces.all[face].side] {
+                if shell.weight > self.least[self.faces.all[face].side] {
                     force += part / shell.weight * shell.force;
                 }
             }
@@ -153,34 +151,23 @@ impl Bowl {
     }
 
     /// What presses on each face, on the grains that bear it: its own, or those of the next face below with grains.
-    /// Returns the weights by side above which a face has grains.
-    fn press_on_shell(&mut self, shells: &mut [Shell]) -> Vec<f64> {
-        let (cells, zone) = (&self.layout.cells, &self.layout.zone);
-        let settings = &self.spec.settings;
-        let least: Vec<f64> = zone
-            .sides
-            .iter()
-            .map(|side| {
-                let shell = settings.shell / settings.cell * cells.spacing[side.axis];
-                LEAST_SHELL * 0.5 * self.spec.density() * shell * cells.face_area(side.axis)
-            })
-            .collect();
+    fn press_on_shell(&mut self, shells: &mut [Shell]) {
+        let impedance = self.spec.settings.impedance;
         for number in 0..self.faces.all.len() {
             let side = self.faces.all[number].side;
             let mut bearer = Some(number);
-            while let Some(face) = bearer.filter(|&face| shells[face].weight <= least[side]) {
+            while let Some(face) = bearer.filter(|&face| shells[face].weight <= self.least[side]) {
                 bearer = self.faces.all[face].below;
             }
             let Some(bearer) = bearer else { continue };
             let slip = over(shells[bearer].slip, shells[bearer].weight);
-            let axis = zone.sides[side].axis;
-            let mut impedance = Vector3::zeros();
-            impedance[axis] = -settings.impedance * self.held.area[number] * slip[axis];
-            shells[bearer].force += self.held.traction[number] + impedance;
+            let axis = self.layout.zone.sides[side].axis;
+            let mut resistance = Vector3::zeros();
+            resistance[axis] = -impedance * self.held.area[number] * slip[axis];
+            shells[bearer].force += self.held.traction[number] + resistance;
             self.laid.traction += self.held.traction[number];
-            self.laid.impedance += impedance;
+            self.laid.impedance += resistance;
         }
-        least
     }
 
     /// Averages of the grains to the continuum, its step, and what it does to the grains until the next exchange.

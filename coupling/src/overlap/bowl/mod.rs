@@ -40,6 +40,8 @@ use continuum::View;
 use nalgebra::Vector3;
 use zone::Faces;
 
+/// Faces with less than this of a full shell hand on what presses on them: a force on few grains throws them out.
+const LEAST_SHELL: f64 = 0.3;
 /// Rows of cells above the surface of the bed, for it to rise into.
 const ROOM: usize = 2;
 /// Rounds in which the height of the continuum and what lies inside the handshake surface come to agree.
@@ -228,6 +230,8 @@ pub struct Bowl {
     layout: Layout,
     units: Units,
     faces: Faces,
+    /// Weight of the shell on a face of each side from which on it bears what presses on it (kg).
+    least: Vec<f64>,
     /// Faces of the handshake surface.
     handshake: Faces,
     flow: SpaceFlow<MuI>,
@@ -320,6 +324,11 @@ impl Bowl {
         let load_time = steps_of_loads as f64 * simulation.timestep();
         let loads = (spec.settings.exchange_time / load_time).round().max(1.0);
         let (count, sides) = (cells.count(), faces.all.len());
+        let shell = spec.settings.shell / spec.settings.cell;
+        let least = |side: &zone::Side| {
+            let width = shell * cells.spacing[side.axis];
+            LEAST_SHELL * 0.5 * spec.density() * width * cells.face_area(side.axis)
+        };
         Ok(Self {
             units,
             start_volume: flow.volume(),
@@ -348,6 +357,7 @@ impl Bowl {
             sighting: Sighting::default(),
             scratch: exchange::Scratch::default(),
             outside: Outside::nothing(count),
+            least: zone.sides.iter().map(least).collect(),
             faces,
             handshake,
             spec,
@@ -440,6 +450,24 @@ impl Bowl {
             0.0,
             |most: f64, m| if m.abs() > most.abs() { m } else { most },
         )
+    }
+
+    /// Distance between the ball's surface and the handshake surface (m), none without a ball: what comes beyond it
+    /// the continuum does not know of.
+    pub fn ball_clearance(&self, simulation: &Simulation) -> Option<f64> {
+        let Layout {
+            cells,
+            zone,
+            widths,
+            ..
+        } = &self.layout;
+        let ball = self.spec.ball?;
+        let ball = simulation.held(|_| true).find(|g| g.id == ball)?;
+        let ways = zone.sides.iter().map(|side| {
+            let depth = zone.depth(cells, side, &ball.position) - widths[0];
+            depth * cells.spacing[side.axis] - ball.radius
+        });
+        Some(ways.fold(f64::INFINITY, f64::min))
     }
 
     /// Time between two exchanges (s).

@@ -301,6 +301,10 @@ impl Recipe for JoinedBed<'_> {
         if bowl.at_exchange() {
             let head = [state[0], state[1]];
             Self::remember(&head, bowl, state);
+            // What the ball does to the continuum, and the continuum to it, nobody computes.
+            if bowl.ball_clearance(simulation).is_some_and(|c| c <= 0.0) {
+                return Ok(Course::Over);
+            }
         } else {
             bowl.write_over(&mut state[HEAD..]);
         }
@@ -320,6 +324,19 @@ impl Recipe for JoinedBed<'_> {
         let bowl = self.recalled(&ran.simulation, &ran.state)?;
         self.book(ran, &bowl, summary);
         self.watch(&bowl, summary);
+        let clearance = bowl.ball_clearance(&ran.simulation).unwrap_or(f64::NAN);
+        summary.put(
+            "overlap_clearance",
+            Quantity::new(clearance, "m")
+                .from("between the ball and the handshake surface at the end"),
+        );
+        if clearance <= 0.0 {
+            summary.remarks.push(format!(
+                "The ball came to the overlap after {:.4} s and the run ended there: the continuum knows of no ball. zones.depth or \
+                 zones.half_width is too small for it.",
+                ran.simulation.time()
+            ));
+        }
         summary.state_hash = state_hash::of_hashes(
             [ran.simulation.state_hash(), state_hash::of(&[&ran.state])]
                 .iter()
