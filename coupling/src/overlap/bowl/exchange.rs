@@ -15,11 +15,11 @@ const LEAST_BUFFER: f64 = 0.1;
 
 /// The shell's weight at a face of the box, and its slip.
 #[derive(Clone, Copy, Debug, Default)]
-struct Shell {
+pub(super) struct Shell {
     /// Σ q h (kg).
-    weight: f64,
+    pub weight: f64,
     /// Σ q h (v − u), u the continuum's velocity at the grain (N s).
-    slip: Vector3<f64>,
+    pub slip: Vector3<f64>,
     /// What presses on it and on those above it without grains (N).
     force: Vector3<f64>,
 }
@@ -28,7 +28,7 @@ struct Shell {
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     near: Vec<GrainSample>,
-    shell: Vec<Shell>,
+    pub(super) shell: Vec<Shell>,
     loads: Vec<Load>,
 }
 

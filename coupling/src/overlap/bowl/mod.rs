@@ -21,6 +21,8 @@ mod continuum;
 mod copy;
 mod exchange;
 mod memory;
+#[cfg(test)]
+mod rotation;
 mod watch;
 mod zone;
 

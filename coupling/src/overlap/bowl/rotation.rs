@@ -1,0 +1,140 @@
+//! Uniform translation and rigid rotation of both sides at once exchange no force.
+
+use super::cells::over;
+use super::*;
+use crate::overlap::{OverlapSettings, Scales};
+use colluvium_dem::{ContactLaw, Domain, Grain, Hooke, Setup, TangentialSpring, Threads, Wall};
+
+const WIDTH: usize = 22;
+const LAYERS: usize = 14;
+/// Layers of cells, from the floor, between whose middles velocities are interpolated from both sides.
+const INSIDE: usize = 5;
+
+/// Grains on a cubic lattice with every third layer of x shifted up, which no mean is symmetric to.
+fn grains() -> Vec<Grain> {
+    let place = |n: usize| {
+        let (i, j, k) = (n / (WIDTH * LAYERS), n / LAYERS % WIDTH, n % LAYERS);
+        let shift = 0.07 * (i % 3) as f64;
+        Vector3::new(i as f64 + 0.5, j as f64 + 0.5, k as f64 + 0.45 + shift)
+    };
+    let ball = |n| Grain::at_rest(place(n), 0.45 + 0.01 * (n % 5) as f64, 1.9);
+    (0..WIDTH * WIDTH * LAYERS).map(ball).collect()
+}
+
+/// A bowl in which both sides drift and turn, the grains at a rate of their own.
+fn joined(rate: Vector3<f64>, drift: Vector3<f64>, ours: Vector3<f64>) -> Bowl {
+    let law = ContactLaw::linear(
+        Hooke::matched(1e4, 0.5),
+        TangentialSpring::matched(2.0 / 7.0, 0.5, 0.5),
+        None,
+    );
+    let width = WIDTH as f64;
+    let mut simulation = Simulation::new(Setup {
+        domain: Domain {
+            lower: Vector3::repeat(-1.0),
+            upper: Vector3::repeat(2.0 * width),
+            periodic: [false; 3],
+        },
+        gravity: -Vector3::z(),
+        law: law.into(),
+        grains: grains(),
+        walls: vec![Wall::plane(Vector3::zeros(), Vector3::z())],
+        bodies: Vec::new(),
+        timestep: 1e-3,
+        threads: Threads::Serial,
+    })
+    .unwrap();
+    let scales = Scales {
+        diameter: 1.0,
+        time: 1.0,
+        density: 1.0,
+        stiffness: 1e4,
+    };
+    let settings = OverlapSettings {
+        cell: Some(2.0),
+        inner: Some(2.0),
+        buffer: Some(2.0),
+        ..OverlapSettings::default()
+    };
+    let spec = BowlSpec {
+        low: [0.0; 3],
+        size: [width; 2],
+        gravity: 1.0,
+        law: MuI::new(0.36, 0.70, 0.3, 1.0, 1.9 * 0.52, 1.0),
+        options: SurfaceOptions::default(),
+        half: [9.0; 2],
+        bottom: 2.0,
+        settings: settings.resolve(&scales, false).unwrap(),
+        ball: None,
+    };
+    let mut bowl = Bowl::cut(spec, &mut simulation).unwrap();
+    let centre = Vector3::new(0.4, 0.6, 0.5) * width;
+    let turn = |rate: Vector3<f64>, at: Vector3<f64>| drift + rate.cross(&(at - centre));
+    simulation.give_velocity(|g| turn(ours, g.position));
+    let mut state = bowl.flow.state().clone();
+    let cells = bowl.layout.cells;
+    for axis in 0..3 {
+        let mut counts = cells.counts;
+        counts[axis] += 1;
+        for (face, u) in state.velocity[axis].iter_mut().enumerate() {
+            let index = [
+                face % counts[0],
+                face / counts[0] % counts[1],
+                face / (counts[0] * counts[1]),
+            ];
+            let at = Vector3::from_fn(|a, _| {
+                let half = if a == axis { 0.0 } else { 0.5 };
+                (index[a] as f64 + half) * cells.spacing[a]
+            });
+            *u = turn(rate, at)[axis] / bowl.units.velocity;
+        }
+    }
+    bowl.flow.set_state(state).unwrap();
+    bowl.sighting.look(&mut simulation);
+    bowl.see_grains();
+    bowl.view.look(&bowl.flow, &cells, &bowl.units);
+    bowl.agree();
+    bowl.lay(&mut simulation).unwrap();
+    bowl
+}
+
+/// Largest acceleration of the relaxation, and slip of the shell on a face, below the surface.
+fn exchanged(bowl: &Bowl) -> [f64; 2] {
+    let cells = &bowl.layout.cells;
+    let inside = |cell: usize| cells.index(cell)[2] < INSIDE;
+    let accelerations = bowl.held.accelerations.iter().enumerate();
+    let accelerations = accelerations.filter(|(cell, _)| inside(*cell));
+    let shells = bowl.faces.all.iter().zip(&bowl.scratch.shell);
+    let slips = shells.filter(|(face, _)| inside(face.cells[0]));
+    [
+        accelerations.fold(0.0, |most: f64, (_, a)| most.max(a.norm())),
+        slips.fold(0.0, |most: f64, (_, s)| {
+            most.max(over(s.slip, s.weight).norm())
+        }),
+    ]
+}
+
+#[test]
+fn what_moves_and_turns_as_one_exchanges_nothing() {
+    let row = Vector3::new;
+    for (rate, drift) in [
+        (row(0.0, 0.0, 0.0), row(0.3, -0.1, 0.2)),
+        (row(0.0, 0.0, 0.2), row(0.0, 0.0, 0.0)),
+        (row(0.1, -0.3, 0.2), row(0.2, 0.1, -0.1)),
+    ] {
+        let [acceleration, slip] = exchanged(&joined(rate, drift, rate));
+        println!("{rate:?} {drift:?}: {acceleration:.1e} {slip:.1e}");
+        assert!(acceleration < 1e-12 && slip < 1e-12);
+    }
+}
+
+/// The control: both turn, but not at the same rate.
+#[test]
+fn what_turns_at_another_rate_does() {
+    let rate = Vector3::new(0.1, -0.3, 0.2);
+    let [acceleration, slip] = exchanged(&joined(rate, Vector3::zeros(), 1.1 * rate));
+    assert!(
+        acceleration > 1e-2 && slip > 1e-2,
+        "{acceleration:e} {slip:e}"
+    );
+}
