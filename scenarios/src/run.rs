@@ -30,6 +30,7 @@ pub mod settle;
 mod silo;
 pub mod step;
 mod surface_fields;
+mod surface_run;
 mod surface_steps;
 mod tensile;
 mod tumbling_box;

@@ -2,26 +2,22 @@
 
 mod beside_continuum;
 
-use super::bagnold::failure;
 use super::surface_fields::{SurfaceFields, field};
-use super::surface_steps::{FRONTS, PROFILES, Steps, columns, join_pictures, put_state, state_of};
+use super::surface_run::{self, Course, Followed};
 use super::{Findings, Under, collapse_ground, joined_column, world};
-use crate::cost::Cost;
 use crate::failure::Failure;
-use crate::frames;
-use crate::progress::Bar;
 use crate::scene::{
     CollapseModel, CollapseScene, CollapseSolver, LawVisitor, Scene, ThinLayerKind,
 };
-use crate::state_hash;
-use crate::summary::{Model, Quantity, Summary};
+use crate::summary::{Quantity, Summary};
 use crate::table::Table;
 use crate::vtkhdf::{Cells, Frame, Values};
-use colluvium_continuum::column_collapse::{Collapse, CollapseCase, Front};
+use colluvium_continuum::Error;
+use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
 use colluvium_continuum::free_surface::{SurfaceOptions, SurfaceState, SurfaceStep, ThinLayer};
 use colluvium_continuum::rheology::ShearLaw;
+use colluvium_continuum::units::Units;
 use colluvium_continuum::wall_friction::{SideWalls, WallFriction};
-use colluvium_dem::Record;
 
 /// What the continuum leaves out.
 pub const LEFT_OUT: [&str; 5] = [
@@ -133,82 +129,64 @@ fn begun<L: ShearLaw + Clone>(
     .map_err(|error| Failure::Input(format!("{origin}: {error}")))
 }
 
-/// What was found on the way, beside the state.
-#[derive(Clone, Debug, Default, PartialEq)]
-struct Course {
-    /// Heights of the ground under the columns of cells; none on a level floor.
-    ground: Vec<f64>,
-    fronts: Vec<Front>,
-    /// Time, position and height, row by row.
-    profiles: [Vec<f64>; 3],
-    /// Time, share of the volume that flows, and that flows where the equations are ill posed.
-    flowing: [Vec<f64>; 3],
-    steps: Steps,
+/// A collapse as a run follows it.
+struct Falling<'a, L> {
+    collapse: Collapse<L>,
+    scene: &'a CollapseScene,
 }
 
-impl Course {
-    /// Takes the front down, once an instant: a run may end at one that was just seen.
-    fn see_front<L: ShearLaw + Clone>(&mut self, collapse: &Collapse<L>, threshold: f64) {
-        let front = collapse.front(threshold);
-        if self.fronts.last().is_none_or(|last| last.time < front.time) {
-            self.fronts.push(front);
-            let [flows, ill] = collapse.flowing_shares();
-            for (column, value) in self.flowing.iter_mut().zip([front.time, flows, ill]) {
-                column.push(value);
-            }
+impl<L: ShearLaw + Clone> Followed<2, 2> for Falling<'_, L> {
+    fn units(&self) -> &Units {
+        self.collapse.units()
+    }
+
+    fn time(&self) -> f64 {
+        self.collapse.time()
+    }
+
+    fn state(&self) -> &SurfaceState {
+        self.collapse.flow().state()
+    }
+
+    fn set_state(&mut self, state: SurfaceState) -> Result<(), Error> {
+        self.collapse.set_state(state)
+    }
+
+    fn step(&mut self, until: f64) -> Result<SurfaceStep, Error> {
+        self.collapse.step(until)
+    }
+
+    fn is_at_rest(&self, step: &SurfaceStep) -> bool {
+        self.collapse.is_at_rest(step)
+    }
+
+    fn volume_drift(&self) -> f64 {
+        self.collapse.volume_drift()
+    }
+
+    fn profile(&self) -> (Vec<f64>, Vec<f64>) {
+        self.collapse.profile()
+    }
+
+    /// The front, and which share of the volume flows, and flows where the equations are ill posed.
+    fn row(&self) -> Vec<f64> {
+        let scene = self.scene;
+        let f = self
+            .collapse
+            .front(scene.front_height_scaled * scene.height);
+        let [flows, ill] = self.collapse.flowing_shares();
+        vec![f.time, f.position, f.height, flows, ill]
+    }
+
+    fn frame(&self) -> Frame {
+        fields(self.scene, &self.collapse)
+    }
+
+    fn ground(&self) -> Vec<f64> {
+        match self.scene.terrain {
+            Some(_) => self.collapse.ground_heights(),
+            None => Vec::new(),
         }
-    }
-
-    fn see_profile<L: ShearLaw + Clone>(&mut self, collapse: &Collapse<L>) {
-        let (x, h) = collapse.profile();
-        let [times, positions, heights] = &mut self.profiles;
-        times.extend(std::iter::repeat_n(collapse.time(), x.len()));
-        positions.extend(x);
-        heights.extend(h);
-    }
-
-    fn record(&self, state: &SurfaceState) -> Record {
-        let mut record = Record::default();
-        let mut put = |name: &str, values: Vec<f64>| {
-            record.numbers.insert(name.to_owned(), values);
-        };
-        if !self.ground.is_empty() {
-            put("ground", self.ground.clone());
-        }
-        let fronts = self.fronts.iter();
-        put(
-            "course/fronts",
-            fronts
-                .flat_map(|f| [f.time, f.position, f.height])
-                .collect(),
-        );
-        put("course/profiles", self.profiles.concat());
-        put("course/flowing", self.flowing.concat());
-        self.steps.put_into(&mut record);
-        put_state(state, &mut record);
-        record
-    }
-
-    fn restored(record: &Record) -> Option<(Course, SurfaceState)> {
-        let numbers = |name: &str| record.numbers.get(name).cloned();
-        let fronts = numbers("course/fronts")?;
-        let profiles = numbers("course/profiles")?;
-        let flowing = numbers("course/flowing")?;
-        let course = Course {
-            ground: numbers("ground").unwrap_or_default(),
-            fronts: fronts
-                .chunks_exact(3)
-                .map(|f| Front {
-                    time: f[0],
-                    position: f[1],
-                    height: f[2],
-                })
-                .collect(),
-            profiles: columns(&profiles),
-            flowing: columns(&flowing),
-            steps: Steps::of(record)?,
-        };
-        Some((course, state_of(record)?))
     }
 }
 
@@ -246,83 +224,19 @@ fn continuum<L: ShearLaw + Clone>(
     scene: &CollapseScene,
     under: &mut Under,
 ) -> Result<Findings, Failure> {
-    let mut collapse = begun(case, scene, &under.scene.origin)?;
-    let unit = collapse.units().time();
-    let end = scene.duration_scaled * unit;
-    let threshold = scene.front_height_scaled * scene.height;
-    let mut course = Course::default();
-    if scene.terrain.is_some() {
-        course.ground = collapse.ground_heights();
-    }
-    if let Some(checkpoint) = &under.resumed {
-        let damaged =
-            || Failure::Input("--resume: the checkpoint misses a part; nothing was changed".into());
-        let (before, state) = Course::restored(&checkpoint.record).ok_or_else(damaged)?;
-        if before.ground != course.ground {
-            return Err(Failure::Input(
-                "--resume: the file of the terrain has other heights than when the run was begun; nothing was changed".into(),
-            ));
-        }
-        course = before;
-        collapse
-            .set_state(state)
-            .map_err(|error| Failure::Input(format!("--resume: {error}; nothing was changed")))?;
-    } else {
-        course.see_front(&collapse, threshold);
-        course.see_profile(&collapse);
-    }
-    let fresh = under.resumed.is_none();
-    under.begin()?;
-    if fresh {
-        picture(under, scene, &collapse, 0)?;
-    }
-    let bar = Bar::new(&under.scene.name);
-    while collapse.time() < end * (1.0 - 1e-9) && !course.steps.rest() {
-        // Steps end at the instants of the tables, whenever a run was begun or resumed.
-        let next = (collapse.time() / end * FRONTS + 1e-6).floor() + 1.0;
-        let step = collapse
-            .step((next / FRONTS * end).min(end))
-            .map_err(failure)?;
-        course.steps.book(&step, collapse.is_at_rest(&step));
-        if (collapse.time() / end * FRONTS - next).abs() < 1e-6 {
-            course.see_front(&collapse, threshold);
-            if (next * PROFILES / FRONTS).fract() < 1e-6 {
-                course.see_profile(&collapse);
-                picture(under, scene, &collapse, next as u64)?;
-            }
-        }
-        bar.set(collapse.time() / end);
-        bar.say(&format!(
-            "{:.3} s, {:.3} m/s",
-            collapse.time(),
-            speed(&collapse, &step)
-        ));
-        under.checkpoint("flow", || course.record(collapse.flow().state()))?;
-    }
-    bar.clear();
+    let collapse = begun(case, scene, &under.scene.origin)?;
+    let end = scene.duration_scaled * collapse.units().time();
+    let mut falling = Falling { collapse, scene };
+    let course = surface_run::follow(&mut falling, end, under)?;
     let wall_s = under.wall_s();
-    course.see_front(&collapse, threshold);
-    join_pictures(under, collapse.time() / end, |last| {
-        picture(under, scene, &collapse, last)
-    })?;
-    let mut summary = Summary::begun(&under.scene.name, "run");
-    describe(&mut summary, scene, &collapse, &course, wall_s);
+    surface_run::join(&falling, end, under)?;
+    let mut summary = surface_run::summary(&falling, &course, &LEFT_OUT, under, wall_s);
+    describe(&mut summary, &falling, &course);
     Ok(Findings {
         summary,
-        tables: tables(&collapse, &course),
+        tables: tables(&falling.collapse, &course),
         grains: None,
     })
-}
-
-/// Writes the fields at an instant of the front.
-fn picture<L: ShearLaw + Clone>(
-    under: &Under,
-    scene: &CollapseScene,
-    collapse: &Collapse<L>,
-    instant: u64,
-) -> Result<(), Failure> {
-    let frame = fields(scene, collapse);
-    frames::put(under.directory.path(), frames::FIELDS, instant, frame)
 }
 
 /// Cells with material as quadrilaterals in the plane y = 0, then the ground under each column of cells
@@ -352,14 +266,8 @@ fn fields<L: ShearLaw + Clone>(scene: &CollapseScene, collapse: &Collapse<L>) ->
     frame
 }
 
-fn speed<L: ShearLaw + Clone>(collapse: &Collapse<L>, step: &SurfaceStep) -> f64 {
-    step.max_speed * collapse.units().velocity
-}
-
 fn tables<L: ShearLaw + Clone>(collapse: &Collapse<L>, course: &Course) -> Vec<Table> {
     let (x, h) = collapse.profile();
-    let fronts = &course.fronts;
-    let [times, positions, heights] = &course.profiles;
     // On ground, its height beside the depth of the material on it.
     let on_ground = |table: Table| {
         if course.ground.is_empty() {
@@ -370,103 +278,56 @@ fn tables<L: ShearLaw + Clone>(collapse: &Collapse<L>, course: &Course) -> Vec<T
     };
     vec![
         Table::new("front")
-            .with("t", "s", fronts.iter().map(|f| f.time).collect())
-            .with("x_front", "m", fronts.iter().map(|f| f.position).collect())
-            .with("height", "m", fronts.iter().map(|f| f.height).collect()),
+            .with("t", "s", course.column(0))
+            .with("x_front", "m", course.column(1))
+            .with("height", "m", course.column(2)),
         on_ground(Table::new("deposit").with("x", "m", x).with("h", "m", h)),
-        on_ground(
-            Table::new("profiles")
-                .with("t", "s", times.clone())
-                .with("x", "m", positions.clone())
-                .with("h", "m", heights.clone()),
-        ),
+        on_ground(course.profiles("x")),
         Table::new("flowing")
-            .with("t", "s", course.flowing[0].clone())
-            .with("flowing_share", "1", course.flowing[1].clone())
-            .with("ill_posed_share", "1", course.flowing[2].clone()),
+            .with("t", "s", course.column(0))
+            .with("flowing_share", "1", course.column(3))
+            .with("ill_posed_share", "1", course.column(4)),
     ]
 }
 
-fn describe<L: ShearLaw + Clone>(
-    summary: &mut Summary,
-    scene: &CollapseScene,
-    collapse: &Collapse<L>,
-    course: &Course,
-    wall_s: f64,
-) {
-    let units = collapse.units();
-    let state = collapse.flow().state();
-    let [_, cell_steps] = course.steps.work();
-    summary.model = Model {
-        grains: 0,
-        cells: state.fractions.len() as u64,
-        dt_s: course.steps.last.dt * units.time(),
-        dt_limit: "courant, with solver.largest_step_scaled".into(),
-        left_out: LEFT_OUT.map(String::from).to_vec(),
-    };
-    summary.cost = Cost::measured(wall_s, 1, 0, cell_steps);
-    summary.ledger.mass_relative = collapse.volume_drift();
-    summary.state_hash = state_hash::of(&[
-        &state.fractions,
-        &state.velocity[0],
-        &state.velocity[1],
-        &state.pressure,
-    ]);
+fn describe<L: ShearLaw + Clone>(summary: &mut Summary, falling: &Falling<L>, course: &Course) {
+    let Falling { collapse, scene } = falling;
     summary.remarks.extend(scene.rheology.remarks());
-    let front = course.fronts.last().copied().unwrap_or_default();
+    let last = course.last().unwrap_or(&[0.0; 5]);
+    let [front, height] = [last[1], last[2]];
     let width = scene.height / scene.aspect;
     let mut put = |name: &str, value: f64, unit: &str, source: &str| {
         summary.put(name, Quantity::new(value, unit).from(source));
     };
     put(
         "x_front",
-        front.position,
+        front,
         "m",
         "where the heap is front_height_scaled high",
     );
     put(
         "runout_scaled",
-        (front.position - width) / width,
+        (front - width) / width,
         "1",
         "(x_front − width)/width",
     );
-    put(
-        "deposit_height",
-        front.height,
-        "m",
-        "greatest height at the end",
-    );
-    put(
-        "time_of_rest",
-        if course.steps.rest() {
-            collapse.time()
-        } else {
-            f64::NAN
-        },
-        "s",
-        "speeds below 5 ε height; null where the run ended before",
-    );
-    let [_, flowing, ill_posed] = &course.flowing;
-    let most = |shares: &[f64]| shares.iter().copied().fold(0.0, f64::max);
+    put("deposit_height", height, "m", "greatest height at the end");
     put(
         "largest_flowing_share",
-        most(flowing),
+        course.largest(3),
         "1",
         "of the volume, at any instant of flowing.csv",
     );
     put(
         "largest_ill_posed_share",
-        most(ill_posed),
+        course.largest(4),
         "1",
         "of the volume: flows where short waves grow without bound, C(I) > 0",
     );
-    course.steps.describe(
-        summary,
-        speed(collapse, &course.steps.last),
-        scene.solver.strain_rate_floor / units.time(),
-    );
+    surface_run::describe_rest(summary, collapse.time(), course);
+    surface_run::describe_steps(summary, falling, course, scene.solver.strain_rate_floor);
     let (x, _) = collapse.profile();
-    if front.position >= x.last().copied().unwrap_or(0.0) {
+    if front >= x.last().copied().unwrap_or(0.0) {
         summary.remarks.push(
             "The heap reached the end of the grid: grid.length_scaled is too small for its run-out.".into(),
         );

@@ -167,6 +167,7 @@ pub(super) fn put_state<const D: usize, const C: usize>(
         "time",
         vec![state.time, state.velocity_time, state.next_step],
     );
+    put("passed", state.passed.to_vec());
     let steps = vec![state.steps as u64];
     record.counts.insert("steps".into(), steps);
 }
@@ -187,23 +188,7 @@ pub(super) fn state_of<const D: usize, const C: usize>(
         velocity_time: *time.get(1)?,
         next_step: *time.get(2)?,
         steps: *record.counts.get("steps")?.first()? as usize,
-        ..SurfaceState::default()
-    })
-}
-
-/// Puts the volumes that flowed through open ends into a checkpoint.
-pub(super) fn put_passed(state: &SurfaceState, record: &mut Record) {
-    record
-        .numbers
-        .insert("passed".to_owned(), state.passed.to_vec());
-}
-
-/// The state in a checkpoint of a flow with open ends.
-pub(super) fn state_with_passed(record: &Record) -> Option<SurfaceState> {
-    let passed = record.numbers.get("passed")?.as_slice().try_into().ok()?;
-    Some(SurfaceState {
-        passed,
-        ..state_of(record)?
+        passed: numbers("passed")?.try_into().ok()?,
     })
 }
 

@@ -1,0 +1,272 @@
+//! A run of a flow with a moving surface: its steps up to the end, with rows, profiles, fields and checkpoints.
+
+use super::Under;
+use super::bagnold::failure;
+use super::surface_steps::{FRONTS, PROFILES, Steps, columns, join_pictures, put_state, state_of};
+use crate::cost::Cost;
+use crate::failure::Failure;
+use crate::frames;
+use crate::progress::Bar;
+use crate::state_hash;
+use crate::summary::{Model, Quantity, Summary};
+use crate::table::Table;
+use crate::vtkhdf::Frame;
+use colluvium_continuum::Error;
+use colluvium_continuum::free_surface::{SurfaceState, SurfaceStep};
+use colluvium_continuum::units::Units;
+use colluvium_dem::Record;
+
+/// What a run asks of its flow; SI units but for the state and what steps report.
+pub(super) trait Followed<const D: usize, const C: usize> {
+    /// Its natural units.
+    fn units(&self) -> &Units;
+    /// Time (s).
+    fn time(&self) -> f64;
+    /// The state.
+    fn state(&self) -> &SurfaceState<D, C>;
+    /// Goes on from another state.
+    fn set_state(&mut self, state: SurfaceState<D, C>) -> Result<(), Error>;
+    /// Makes a step that ends at a time (s) at the latest.
+    fn step(&mut self, until: f64) -> Result<SurfaceStep, Error>;
+    /// Whether a step left everything at rest, so that the run may end.
+    fn is_at_rest(&self, step: &SurfaceStep) -> bool;
+    /// Volume gained, relative.
+    fn volume_drift(&self) -> f64;
+    /// Places and heights of the surface (m).
+    fn profile(&self) -> (Vec<f64>, Vec<f64>);
+    /// What is noted at every instant, the time first.
+    fn row(&self) -> Vec<f64>;
+    /// The fields of now.
+    fn frame(&self) -> Frame;
+    /// Heights of the ground, if there is any: a run goes on over the same only.
+    fn ground(&self) -> Vec<f64> {
+        Vec::new()
+    }
+}
+
+/// What was found on the way, beside the state.
+#[derive(Clone, Debug, Default, PartialEq)]
+pub(super) struct Course {
+    /// Rows of every instant, one behind the other.
+    rows: Vec<f64>,
+    /// Numbers of a row.
+    width: usize,
+    /// Time, place and height, row by row.
+    profiles: [Vec<f64>; 3],
+    /// Heights of the ground; none on a level floor.
+    pub ground: Vec<f64>,
+    /// What the steps add up to.
+    pub steps: Steps,
+}
+
+impl Course {
+    /// Nothing yet.
+    fn of<const D: usize, const C: usize>(flow: &impl Followed<D, C>) -> Self {
+        Self {
+            width: flow.row().len(),
+            ground: flow.ground(),
+            ..Self::default()
+        }
+    }
+
+    /// Takes a row down, once an instant: a run may end at one that was just seen.
+    fn see<const D: usize, const C: usize>(&mut self, flow: &impl Followed<D, C>) {
+        let row = flow.row();
+        if self.last().is_none_or(|last| last[0] < row[0]) {
+            self.rows.extend(row);
+        }
+    }
+
+    fn see_profile<const D: usize, const C: usize>(&mut self, flow: &impl Followed<D, C>) {
+        let (x, h) = flow.profile();
+        let [times, places, heights] = &mut self.profiles;
+        times.extend(std::iter::repeat_n(flow.time(), x.len()));
+        places.extend(x);
+        heights.extend(h);
+    }
+
+    /// The last row.
+    pub fn last(&self) -> Option<&[f64]> {
+        self.rows.chunks_exact(self.width.max(1)).next_back()
+    }
+
+    /// A column of the rows.
+    pub fn column(&self, number: usize) -> Vec<f64> {
+        let rows = self.rows.chunks_exact(self.width.max(1));
+        rows.map(|row| row[number]).collect()
+    }
+
+    /// The largest number of a column, at least 0.
+    pub fn largest(&self, number: usize) -> f64 {
+        self.column(number).into_iter().fold(0.0, f64::max)
+    }
+
+    /// The table of profiles over the places of this name.
+    pub fn profiles(&self, place: &str) -> Table {
+        let [times, places, heights] = self.profiles.clone();
+        Table::new("profiles")
+            .with("t", "s", times)
+            .with(place, "m", places)
+            .with("h", "m", heights)
+    }
+
+    fn record<const D: usize, const C: usize>(&self, state: &SurfaceState<D, C>) -> Record {
+        let mut record = Record::default();
+        for (name, values) in [
+            ("course/rows", self.rows.clone()),
+            ("course/profiles", self.profiles.concat()),
+            ("ground", self.ground.clone()),
+        ] {
+            if !values.is_empty() {
+                record.numbers.insert(name.to_owned(), values);
+            }
+        }
+        self.steps.put_into(&mut record);
+        put_state(state, &mut record);
+        record
+    }
+
+    /// The course of a checkpoint, with rows of as many numbers as these have, and its state.
+    fn restored<const D: usize, const C: usize>(
+        &self,
+        record: &Record,
+    ) -> Option<(Course, SurfaceState<D, C>)> {
+        let numbers = |name: &str| record.numbers.get(name);
+        let rows = numbers("course/rows")?.clone();
+        let course = Course {
+            width: self.width,
+            profiles: columns(numbers("course/profiles")?),
+            ground: numbers("ground").cloned().unwrap_or_default(),
+            steps: Steps::of(record)?,
+            rows,
+        };
+        let fits = course.rows.len().is_multiple_of(self.width.max(1));
+        fits.then_some(())?;
+        Some((course, state_of(record)?))
+    }
+}
+
+/// Follows a flow up to a time (s) or to its rest, from the start or from where the run stood.
+pub(super) fn follow<const D: usize, const C: usize>(
+    flow: &mut impl Followed<D, C>,
+    end: f64,
+    under: &mut Under,
+) -> Result<Course, Failure> {
+    let mut course = Course::of(flow);
+    let fresh = under.resumed.is_none();
+    if let Some(checkpoint) = &under.resumed {
+        let damaged =
+            || Failure::Input("--resume: the checkpoint misses a part; nothing was changed".into());
+        let (before, state) = course.restored(&checkpoint.record).ok_or_else(damaged)?;
+        if before.ground != course.ground {
+            return Err(Failure::Input(
+                "--resume: the file of the terrain has other heights than when the run was begun; nothing was changed".into(),
+            ));
+        }
+        course = before;
+        flow.set_state(state)
+            .map_err(|error| Failure::Input(format!("--resume: {error}; nothing was changed")))?;
+    } else {
+        course.see(flow);
+        course.see_profile(flow);
+    }
+    under.begin()?;
+    if fresh {
+        picture(under, flow, 0)?;
+    }
+    let bar = Bar::new(&under.scene.name);
+    while flow.time() < end * (1.0 - 1e-9) && !course.steps.rest() {
+        // Steps end at the instants of the tables, whenever a run was begun or resumed.
+        let next = (flow.time() / end * FRONTS + 1e-6).floor() + 1.0;
+        let step = flow.step((next / FRONTS * end).min(end)).map_err(failure)?;
+        course.steps.book(&step, flow.is_at_rest(&step));
+        if (flow.time() / end * FRONTS - next).abs() < 1e-6 {
+            course.see(flow);
+            if (next * PROFILES / FRONTS).fract() < 1e-6 {
+                course.see_profile(flow);
+                picture(under, flow, next as u64)?;
+            }
+        }
+        bar.set(flow.time() / end);
+        let speed = step.max_speed * flow.units().velocity;
+        bar.say(&format!("{:.3} s, {speed:.3} m/s", flow.time()));
+        under.checkpoint("flow", || course.record(flow.state()))?;
+    }
+    bar.clear();
+    course.see(flow);
+    Ok(course)
+}
+
+/// Joins the fields of a run that has come to its end (s).
+pub(super) fn join<const D: usize, const C: usize>(
+    flow: &impl Followed<D, C>,
+    end: f64,
+    under: &Under,
+) -> Result<(), Failure> {
+    join_pictures(under, flow.time() / end, |last| picture(under, flow, last))
+}
+
+/// Writes the fields at an instant.
+fn picture<const D: usize, const C: usize>(
+    under: &Under,
+    flow: &impl Followed<D, C>,
+    instant: u64,
+) -> Result<(), Failure> {
+    frames::put(
+        under.directory.path(),
+        frames::FIELDS,
+        instant,
+        flow.frame(),
+    )
+}
+
+/// What every summary of such a run begins with: model, cost and state.
+pub(super) fn summary<const D: usize, const C: usize>(
+    flow: &impl Followed<D, C>,
+    course: &Course,
+    left_out: &[&str],
+    under: &Under,
+    wall_s: f64,
+) -> Summary {
+    let mut summary = Summary::begun(&under.scene.name, "run");
+    let state = flow.state();
+    let [_, cell_steps] = course.steps.work();
+    summary.model = Model {
+        grains: 0,
+        cells: state.fractions.len() as u64,
+        dt_s: course.steps.last.dt * flow.units().time(),
+        dt_limit: "courant, with solver.largest_step_scaled".into(),
+        left_out: left_out.iter().copied().map(String::from).collect(),
+    };
+    summary.cost = Cost::measured(wall_s, 1, 0, cell_steps);
+    summary.ledger.mass_relative = flow.volume_drift();
+    let mut arrays = vec![state.fractions.as_slice()];
+    arrays.extend(state.velocity.iter().map(Vec::as_slice));
+    arrays.push(&state.pressure);
+    summary.state_hash = state_hash::of(&arrays);
+    summary
+}
+
+/// Says what the steps were.
+pub(super) fn describe_steps<const D: usize, const C: usize>(
+    summary: &mut Summary,
+    flow: &impl Followed<D, C>,
+    course: &Course,
+    strain_rate_floor: f64,
+) {
+    let units = flow.units();
+    course.steps.describe(
+        summary,
+        course.steps.last.max_speed * units.velocity,
+        strain_rate_floor / units.time(),
+    );
+}
+
+/// Says when a run came to rest.
+pub(super) fn describe_rest(summary: &mut Summary, time: f64, course: &Course) {
+    let time = if course.steps.rest() { time } else { f64::NAN };
+    summary.put(
+        "time_of_rest",
+        Quantity::new(time, "s").from("speeds below 5 ε height; null where the run ended before"),
+    );
+}
