@@ -15,6 +15,8 @@ const AROUND: f64 = 4.0;
 const UNDER: f64 = 2.0;
 /// Times d/v of which all times of the overlap are parts: waves cross a grain many times in it.
 const TIME: f64 = 2.0;
+/// The time between two exchanges over that: a third of it costs more and is no nearer to grains alone.
+const EXCHANGE: f64 = 0.6;
 
 /// Where grains stay, at scale 1. What is left out is computed; `colluvium plan` says it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -143,6 +145,7 @@ impl BallImpactScene {
             stiffness,
         };
         let mut settings = self.overlap.settings(d, scales.time);
+        settings.exchange_time = settings.exchange_time.or(Some(EXCHANGE * scales.time));
         settings.cell = Some(self.zones.cell_diameters * d);
         super::collapse_zones::resolved(&settings, &scales, origin)
     }
