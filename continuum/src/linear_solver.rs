@@ -8,6 +8,9 @@
 //! - [`Method::Preconditioned`]: LDLᵀ factors of the symmetric part, made definite by −δ on the
 //!   pressures, precondition GMRES on the full system: several times faster in two dimensions. If
 //!   GMRES stalls, the system is solved directly.
+//! - [`Method::Multigrid`]: a multigrid cycle on the full system preconditions GMRES. Work and memory are
+//!   in proportion to the number of unknowns; in space that is cheaper from a thousand cells on. If GMRES
+//!   stalls, the factors take over.
 //!
 //! The pattern is analysed once, numerical factors are made anew for every Newton iteration, always
 //! on one thread and in one order, so the bits do not depend on the number of threads.
@@ -16,6 +19,7 @@ mod dissection;
 mod gmres;
 mod ldlt;
 mod lu;
+mod multigrid;
 mod substitution;
 
 use faer::sparse::SymbolicSparseColMat;
@@ -26,6 +30,7 @@ use dissection::dissect;
 use gmres::Gmres;
 use ldlt::QuasiDefinite;
 use lu::Lu;
+use multigrid::Multigrid;
 
 /// Relative residual from which on factors in single precision are enough.
 pub(crate) const LOOSE: f64 = 1e-6;
@@ -36,14 +41,21 @@ pub enum Method {
     /// LU factors of the whole matrix.
     Direct,
     /// GMRES with LDLᵀ factors of the symmetric part.
-    Preconditioned {
-        /// Number of unknowns in the positive definite block K, which come first.
-        definite: usize,
-        /// δ, subtracted from the diagonal of the other block in the preconditioner.
-        regularisation: f64,
-        /// Residual at which GMRES ends, relative to the right-hand side.
-        tolerance: f64,
-    },
+    Preconditioned(Krylov),
+    /// GMRES with a multigrid cycle. It needs the places of the unknowns; without them it is
+    /// [`Preconditioned`](Self::Preconditioned).
+    Multigrid(Krylov),
+}
+
+/// What the iterative methods have to know of a system.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Krylov {
+    /// Number of unknowns in the positive definite block K, which come first.
+    pub definite: usize,
+    /// δ, subtracted from the diagonal of the other block where factors precondition.
+    pub regularisation: f64,
+    /// Residual at which GMRES ends, relative to the right-hand side.
+    pub tolerance: f64,
 }
 
 /// Row and column of a coefficient.
@@ -54,17 +66,49 @@ pub struct SparseSystem {
     pattern: SymbolicSparseColMat<usize>,
     values: Vec<f64>,
     residual: Vec<f64>,
-    iterative: Option<(QuasiDefinite, Gmres)>,
+    iterative: Option<Iterative>,
     direct: Option<Lu>,
     state: Factors,
+}
+
+/// The iteration and its preconditioners.
+struct Iterative {
+    gmres: Gmres,
+    multigrid: Option<Multigrid>,
+    /// With multigrid these are made when it stalls.
+    factors: Option<QuasiDefinite>,
+    krylov: Krylov,
+    diagonal: Vec<u32>,
+    order: Option<Vec<usize>>,
 }
 
 /// Which factors belong to the present coefficients.
 #[derive(Debug, Clone, Copy, PartialEq)]
 enum Factors {
     None,
+    Multigrid,
     Symmetric,
     Full,
+}
+
+impl Iterative {
+    /// Analyses the pattern for LDLᵀ factors, once.
+    fn analyse(
+        &mut self,
+        pattern: &SymbolicSparseColMat<usize>,
+    ) -> Result<&mut QuasiDefinite, Error> {
+        match &mut self.factors {
+            Some(factors) => Ok(factors),
+            empty => Ok(empty.insert(QuasiDefinite::new(
+                pattern.as_ref(),
+                self.krylov.definite,
+                self.krylov.regularisation,
+                std::mem::take(&mut self.diagonal),
+                self.order.take(),
+                self.krylov.tolerance >= LOOSE,
+            )?)),
+        }
+    }
 }
 
 impl SparseSystem {
@@ -97,24 +141,35 @@ impl SparseSystem {
             direct: None,
             state: Factors::None,
         };
-        match method {
-            Method::Direct => system.direct = Some(Lu::new(system.pattern.as_ref())?),
-            Method::Preconditioned {
-                definite,
-                regularisation,
-                tolerance,
-            } => {
-                let preconditioner = QuasiDefinite::new(
-                    system.pattern.as_ref(),
-                    definite,
-                    regularisation,
-                    diagonal_slots,
-                    places.map(|places| dissect(places, definite)),
-                    tolerance >= LOOSE,
-                )?;
-                system.iterative = Some((preconditioner, Gmres::new(size, tolerance)));
+        let (krylov, with_multigrid) = match method {
+            Method::Direct => {
+                system.direct = Some(Lu::new(system.pattern.as_ref())?);
+                return Ok((system, slots));
             }
+            Method::Preconditioned(krylov) => (krylov, None),
+            Method::Multigrid(krylov) => (krylov, places),
+        };
+        let multigrid = match with_multigrid {
+            None => None,
+            Some(places) => Some(Multigrid::new(
+                system.pattern.as_ref(),
+                krylov.definite,
+                krylov.regularisation,
+                places,
+            )?),
+        };
+        let mut iterative = Iterative {
+            gmres: Gmres::new(size, krylov.tolerance),
+            multigrid,
+            factors: None,
+            krylov,
+            diagonal: diagonal_slots,
+            order: places.map(|places| dissect(places, krylov.definite)),
+        };
+        if iterative.multigrid.is_none() {
+            iterative.analyse(&system.pattern)?;
         }
+        system.iterative = Some(iterative);
         Ok((system, slots))
     }
 
@@ -129,8 +184,21 @@ impl SparseSystem {
     /// # Errors
     /// [`Error::LinearSolver`] if the matrix is singular or memory runs out.
     pub fn factorise(&mut self) -> Result<(), Error> {
-        if let Some((preconditioner, _)) = &mut self.iterative
-            && preconditioner
+        if let Some(iterative) = &mut self.iterative
+            && let Some(multigrid) = &mut iterative.multigrid
+            && multigrid.set_up(&self.values).is_ok()
+        {
+            self.state = Factors::Multigrid;
+            return Ok(());
+        }
+        self.factorise_symmetric_part()
+    }
+
+    /// The factors that precondition, or those of the whole matrix if there are none.
+    fn factorise_symmetric_part(&mut self) -> Result<(), Error> {
+        if let Some(iterative) = &mut self.iterative
+            && let Ok(factors) = iterative.analyse(&self.pattern)
+            && factors
                 .factorise(self.pattern.as_ref(), &self.values)
                 .is_ok()
         {
@@ -150,23 +218,40 @@ impl SparseSystem {
         Ok(())
     }
 
+    /// GMRES with the present preconditioner; says whether it came to its end.
+    fn iterate(&mut self, right_hand_side: &[f64], solution: &mut [f64]) -> bool {
+        let (pattern, values) = (&self.pattern, &self.values);
+        let multiply = |x: &[f64], y: &mut [f64]| multiply(pattern, values, x, y);
+        let Some(iterative) = &mut self.iterative else {
+            return false;
+        };
+        let gmres = &mut iterative.gmres;
+        match (self.state, &mut iterative.multigrid, &mut iterative.factors) {
+            (Factors::Multigrid, Some(multigrid), _) => {
+                let precondition = |x: &mut [f64]| multigrid.solve(x);
+                gmres.solve(multiply, precondition, right_hand_side, solution)
+            }
+            (Factors::Symmetric, _, Some(factors)) => {
+                let precondition = |x: &mut [f64]| factors.solve(x);
+                gmres.solve(multiply, precondition, right_hand_side, solution)
+            }
+            _ => false,
+        }
+    }
+
     /// Solves for one right-hand side.
     ///
     /// # Errors
     /// [`Error::LinearSolver`] if there are no factors or the solution is not finite.
     pub fn solve(&mut self, right_hand_side: &[f64], solution: &mut [f64]) -> Result<(), Error> {
+        if self.state == Factors::Multigrid {
+            if self.iterate(right_hand_side, solution) {
+                return Ok(());
+            }
+            self.factorise_symmetric_part()?;
+        }
         if self.state == Factors::Symmetric {
-            let pattern = &self.pattern;
-            let values = &self.values;
-            let multiply = |x: &[f64], y: &mut [f64]| multiply(pattern, values, x, y);
-            if let Some((preconditioner, gmres)) = &mut self.iterative
-                && gmres.solve(
-                    multiply,
-                    |x: &mut [f64]| preconditioner.solve(x),
-                    right_hand_side,
-                    solution,
-                )
-            {
+            if self.iterate(right_hand_side, solution) {
                 return Ok(());
             }
             self.factorise_directly()?;
@@ -269,23 +354,30 @@ mod tests {
             [1, 2],
         ];
         let coefficients = [2.0, 1.0, 1.0, 1.0, 1.0, 1.0, 2.0, g];
+        // Two faces of a cell.
+        let places: [Place; 3] = [[0, 1], [2, 1], [1, 1]];
         let (mut system, slots) =
-            SparseSystem::new(3, entries.to_vec(), method, None::<&[Place]>).unwrap();
+            SparseSystem::new(3, entries.to_vec(), method, Some(&places)).unwrap();
         for (slot, c) in slots.iter().zip(coefficients) {
             system.values_mut()[*slot as usize] += c;
         }
         system
     }
 
-    const ITERATIVE: Method = Method::Preconditioned {
+    const KRYLOV: Krylov = Krylov {
         definite: 2,
         regularisation: 1e-6,
         tolerance: 1e-10,
     };
+    const METHODS: [(Method, f64); 3] = [
+        (Method::Direct, 1e-14),
+        (Method::Preconditioned(KRYLOV), 1e-9),
+        (Method::Multigrid(KRYLOV), 1e-9),
+    ];
 
     #[test]
-    fn both_methods_solve_a_saddle_point_system() {
-        for (method, tolerance) in [(Method::Direct, 1e-14), (ITERATIVE, 1e-9)] {
+    fn all_methods_solve_a_saddle_point_system() {
+        for (method, tolerance) in METHODS {
             for g in [0.0, 0.3] {
                 let mut system = saddle(method, g);
                 system.factorise().unwrap();
@@ -298,9 +390,10 @@ mod tests {
         }
     }
 
+    /// Multigrid stalls, the factors of the symmetric part do, and those of the whole matrix say why.
     #[test]
     fn singular_matrix_is_an_error() {
-        for method in [Method::Direct, ITERATIVE] {
+        for (method, _) in METHODS {
             let mut system = saddle(method, 0.0);
             system.values_mut().fill(0.0);
             let mut x = [0.0; 3];

@@ -52,9 +52,24 @@ pub struct PrimalDualOptions {
     /// iteratively. A tighter one than the default saves no iteration; it leaves less of what the order of
     /// elimination does to a flow that mirrors itself.
     pub linear_tolerance: f64,
+    /// How the linear systems of flows along more than one axis are solved.
+    pub linear_solver: LinearSolver,
     /// Whether pressure is one-sided: p ≥ 0 and ∇·u ≥ 0, one of them zero, so that matter that is
     /// pulled apart falls freely instead of being held by suction.
     pub one_sided_pressure: bool,
+}
+
+/// What preconditions the Krylov iteration on the linear system.
+#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
+pub enum LinearSolver {
+    /// Whichever is cheaper at the size of the system.
+    #[default]
+    Automatic,
+    /// LDLᵀ factors of the symmetric part.
+    Factors,
+    /// A multigrid cycle; factors where the places of the unknowns are not known.
+    Multigrid,
 }
 
 impl Default for PrimalDualOptions {
@@ -69,6 +84,7 @@ impl Default for PrimalDualOptions {
             stress_tolerance: 1e-8,
             tolerance_in_motion: 1.0,
             linear_tolerance: NEWTON_TOLERANCE,
+            linear_solver: LinearSolver::Automatic,
             one_sided_pressure: false,
         }
     }
@@ -167,7 +183,11 @@ impl<const C: usize> PrimalDual<C> {
         let cells = discretisation.cells();
         Ok(Self {
             options,
-            matrix: StepMatrix::new(discretisation, options.linear_tolerance)?,
+            matrix: StepMatrix::new(
+                discretisation,
+                options.linear_tolerance,
+                options.linear_solver,
+            )?,
             trial: FlowState::at_rest(discretisation, vec![0.0; cells]),
             points: vec![LinearisedPoint::default(); discretisation.points().len()],
             released: vec![false; cells],

@@ -9,8 +9,8 @@ use serde::{Deserialize, Serialize};
 
 use super::coefficients::StepMatrix;
 use super::{
-    FlowState, StepProblem, StepReport, YieldSolver, divergence_residual, largest_or_nan,
-    momentum_residual, threshold_pressure,
+    FlowState, LinearSolver, StepProblem, StepReport, YieldSolver, divergence_residual,
+    largest_or_nan, momentum_residual, threshold_pressure,
 };
 use crate::discretisation::{COMPONENTS, Discretisation};
 use crate::error::{Error, require};
@@ -78,7 +78,7 @@ impl RegularisedViscosity {
         let size = discretisation.velocities() + cells;
         Ok(Self {
             options,
-            matrix: StepMatrix::new(discretisation, LINEAR_TOLERANCE)?,
+            matrix: StepMatrix::new(discretisation, LINEAR_TOLERANCE, LinearSolver::Factors)?,
             trial: FlowState::at_rest(discretisation, vec![0.0; cells]),
             viscosity: vec![0.0; discretisation.points().len()],
             released: vec![false; cells],
