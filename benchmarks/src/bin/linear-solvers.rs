@@ -1,0 +1,158 @@
+//! Cost of the linear solvers by size: CPU time per active cell and Newton iteration, and memory, with factors and
+//! with multigrid.
+//!
+//! `cargo run --release -p colluvium-benchmarks --bin linear-solvers -- space 0.1 1e-3 16 24 32 40` collapses a quarter
+//! of a cylinder until t = 0.1 √(H/g) on these numbers of cells, with linear systems solved to 1e-3; `plane` a column.
+//! Each case runs in a process of its own, both solvers by turns, because memory belongs to a process and
+//! a machine's speed changes with time.
+
+use std::io::Error as IoError;
+use std::process::Command;
+
+use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
+use colluvium_continuum::cylinder_collapse::{CylinderCase, CylinderCollapse};
+use colluvium_continuum::free_surface::{SurfaceOptions, SurfaceStep};
+use colluvium_continuum::rheology::MuI;
+use colluvium_continuum::yield_step::LinearSolver;
+
+type Outcome = Result<(), Box<dyn std::error::Error>>;
+
+const USAGE: &str = "arguments: space|plane END TOLERANCE CELLS...";
+
+fn main() -> Outcome {
+    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    match arguments.as_slice() {
+        [flow, end, tolerance, cells, solver] if solver.parse::<usize>().is_err() => {
+            let solver = match solver.as_str() {
+                "factors" => LinearSolver::Factors,
+                _ => LinearSolver::Multigrid,
+            };
+            run(
+                flow,
+                end.parse()?,
+                tolerance.parse()?,
+                cells.parse()?,
+                solver,
+            )
+        }
+        [flow, end, tolerance, cells @ ..] if !cells.is_empty() => {
+            println!(
+                "solver    cells  active  steps  iterations  CPU (s)  us/cell/iteration  MB  run-out  asymmetry"
+            );
+            let program = std::env::current_exe()?;
+            for cells in cells {
+                for solver in ["factors", "multigrid"] {
+                    let status = Command::new(&program)
+                        .args([flow, end, tolerance, cells, solver])
+                        .status()?;
+                    if !status.success() {
+                        println!("{solver} {cells}: {status}");
+                    }
+                }
+            }
+            Ok(())
+        }
+        _ => Err(USAGE.into()),
+    }
+}
+
+/// What a run took.
+#[derive(Default)]
+struct Work {
+    active: usize,
+    steps: usize,
+    iterations: usize,
+    cell_iterations: usize,
+}
+
+impl Work {
+    fn add(&mut self, step: &SurfaceStep) {
+        self.active = step.active_cells;
+        self.steps += 1;
+        self.iterations += step.newton_iterations;
+        self.cell_iterations += step.active_cells * step.newton_iterations;
+    }
+}
+
+fn run(flow: &str, end: f64, tolerance: f64, cells: usize, solver: LinearSolver) -> Outcome {
+    let mut options = SurfaceOptions::default();
+    options.solver.linear_tolerance = tolerance;
+    options.solver.linear_solver = solver;
+    let begin = cpu_seconds()?;
+    let mut work = Work::default();
+    let (run_out, asymmetry) = match flow {
+        "space" => {
+            let case = CylinderCase {
+                aspect: 1.0,
+                height: 1.0,
+                gravity: 1.0,
+                rheology: MuI::new(0.382, 0.643, 0.279, 0.02, 1.0, 1.0),
+                cells,
+                length_scaled: 2.9,
+                whole: false,
+            };
+            let mut collapse = CylinderCollapse::new(&case, &options)?;
+            while collapse.time() < end - 1e-9 {
+                let step = collapse.step(end)?;
+                work.add(&step);
+                if collapse.is_at_rest(&step) {
+                    break;
+                }
+            }
+            (collapse.front(0.02).radius - 1.0, collapse.asymmetry())
+        }
+        "plane" => {
+            let case = CollapseCase {
+                aspect: 1.42,
+                height: 1.0,
+                gravity: 1.0,
+                rheology: MuI::new(0.32, 0.60, 0.4, 1.0 / 65.0, 1.0, 1.0),
+                cells,
+                length_scaled: 5.0,
+                overhang_degrees: 0.0,
+            };
+            let mut collapse = Collapse::new(&case, &options)?;
+            while collapse.time() < end - 1e-9 {
+                let step = collapse.step(end)?;
+                work.add(&step);
+                if collapse.is_at_rest(&step) {
+                    break;
+                }
+            }
+            (collapse.front(0.02).position * 1.42 - 1.0, 0.0)
+        }
+        _ => return Err(USAGE.into()),
+    };
+    let cpu = cpu_seconds()? - begin;
+    println!(
+        "{:9} {cells:5} {:7} {:6} {:11} {cpu:8.2} {:18.1} {:4.0} {run_out:.12} {asymmetry:.1e}",
+        format!("{solver:?}").to_lowercase(),
+        work.active,
+        work.steps,
+        work.iterations,
+        cpu * 1e6 / work.cell_iterations as f64,
+        peak_megabytes()?,
+    );
+    Ok(())
+}
+
+/// Time for which this thread had a processor (s).
+fn cpu_seconds() -> Result<f64, IoError> {
+    let text = std::fs::read_to_string("/proc/thread-self/schedstat")?;
+    let first = text
+        .split_whitespace()
+        .next()
+        .and_then(|n| n.parse::<f64>().ok());
+    first
+        .map(|n| n * 1e-9)
+        .ok_or_else(|| IoError::other("no time in /proc/thread-self/schedstat"))
+}
+
+/// Most memory that the process ever held (MB).
+fn peak_megabytes() -> Result<f64, IoError> {
+    let text = std::fs::read_to_string("/proc/self/status")?;
+    let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
+    line.and_then(|line| line.split_whitespace().next()?.parse::<f64>().ok())
+        .map(|kilobytes| kilobytes / 1024.0)
+        .ok_or_else(|| IoError::other("no VmHWM in /proc/self/status"))
+}
