@@ -1,8 +1,10 @@
 //! Parts of space, for rules that hold only there.
 
 use crate::setup::{SetupError, check};
+use crate::walls::Mesh;
 use nalgebra::Vector3;
 use std::fmt;
+use std::sync::Arc;
 
 /// A part of space (m).
 #[derive(Clone, Debug, PartialEq)]
@@ -52,6 +54,8 @@ pub enum Region {
         /// Radii at both ends (m).
         radii: [f64; 2],
     },
+    /// What a closed surface of triangles encloses.
+    Mesh(Arc<Mesh>),
     /// Where all of these are.
     All(Vec<Region>),
     /// Where any of these is.
@@ -77,7 +81,7 @@ impl Region {
                 axis,
                 radius,
             } => (x - point).cross(axis).norm() <= radius * axis.norm(),
-            Region::Frustum { .. } => self.depth(x) >= 0.0,
+            Region::Frustum { .. } | Region::Mesh(_) => self.depth(x) >= 0.0,
             Region::All(parts) => parts.iter().all(|part| part.contains(x)),
             Region::Any(parts) => parts.iter().any(|part| part.contains(x)),
             Region::Outside(part) => !part.contains(x),
@@ -117,6 +121,7 @@ impl Region {
                 let side = (low + slope * along - across) / slope.hypot(1.0);
                 side.min(along).min(length - along)
             }
+            Region::Mesh(mesh) => mesh.depth(x),
             Region::All(parts) => {
                 let depths = parts.iter().map(|part| part.depth(x));
                 depths.fold(f64::INFINITY, f64::min)
@@ -178,6 +183,7 @@ impl Region {
                 let [a, b] = ends.map(|(x, r)| [x - reach(r), x + reach(r)]);
                 [a[0].inf(&b[0]), a[1].sup(&b[1])]
             }
+            Region::Mesh(mesh) => mesh.bounds(),
             Region::All(parts) => parts.iter().fold(everything, |[low, high], part| {
                 let [l, h] = part.bounds();
                 [low.sup(&l), high.inf(&h)]
@@ -258,6 +264,17 @@ impl Region {
                 }
                 length("radii, the larger", radii[0].max(radii[1]))
             }
+            Region::Mesh(mesh) => {
+                let report = mesh.report();
+                let ends = report.open_edges + report.branching_edges;
+                let key = format!("{key}.mesh: edges that have not two triangles");
+                check(
+                    &key,
+                    ends as f64,
+                    "0: only a closed mesh encloses something",
+                    |n| n == 0.0,
+                )
+            }
             Region::All(parts) | Region::Any(parts) => parts
                 .iter()
                 .enumerate()
@@ -324,6 +341,12 @@ impl fmt::Display for Region {
                 radii[1],
                 point(at)
             ),
+            Region::Mesh(mesh) => {
+                let [low, high] = mesh.bounds();
+                let count = mesh.triangles().len();
+                let (low, high) = (point(&low), point(&high));
+                write!(f, "the mesh of {count} triangles from {low} to {high}")
+            }
             Region::All(parts) => list(f, parts, " in "),
             Region::Any(parts) => list(f, parts, " or "),
             Region::Outside(part) => write!(f, "outside {part}"),

@@ -136,7 +136,9 @@ impl Simulation {
         let smallest = radii().fold(f64::INFINITY, f64::min);
         let largest_radius = radii().fold(0.0, f64::max);
         let skin = skin_of(smallest);
-        let law = setup.validate(skin)?;
+        // Grains that are still to come bring their own skin, and meet this check when they do.
+        let own = if setup.grains.is_empty() { 0.0 } else { skin };
+        let law = setup.validate(own)?;
         let mut walls = stand(setup.walls, setup.timestep);
         let bodies = Bodies::new(setup.bodies, &mut walls, &law, setup.timestep)?;
         Ok(Simulation {

@@ -620,3 +620,22 @@ fn packings_are_trimmed_glued_scaled_and_placed() {
             .contains("periodic")
     );
 }
+
+#[test]
+fn a_narrow_periodic_box_may_begin_empty_and_is_checked_as_grains_come() {
+    // Grains of 1 mm in a box of 1 cm (SI): what the list needs is known only with them.
+    let setup = |edge: f64| {
+        let mut setup = floor(edge, 0.1, Vec::new(), rough(0.5));
+        setup.gravity *= 10.0;
+        setup.timestep = 1e-6;
+        setup
+    };
+    let put = |edge: f64| {
+        let mut simulation = Simulation::new(setup(edge)).unwrap();
+        let grain = Grain::at_rest(Vector3::new(1e-3, 1e-3, 0.05), 5e-4, 2500.0);
+        simulation.insert(&[grain]).map(drop)
+    };
+    put(0.01).unwrap();
+    let error = put(1.5e-3).unwrap_err();
+    assert!(matches!(error, SetupError::NarrowDomain { .. }), "{error}");
+}

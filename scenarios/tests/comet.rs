@@ -72,6 +72,53 @@ fn small_samples_break_at_a_stress_of_the_papers_order() {
     assert!(value(&whole, "strength") < strength);
 }
 
+/// One sample, softer still.
+const HELD: [&str; 6] = [
+    "coarse_graining=6",
+    "samples=1",
+    "material.mix=one-to-one",
+    "contact.youngs_modulus=1e6",
+    "contact.work_of_adhesion=0.056",
+    "output.pictures=0",
+];
+
+#[test]
+fn a_cone_that_is_a_wall_holds_its_sample_and_a_straight_tube_does_not() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    let with = |more: &[&'static str]| [&HELD[..], more].concat();
+    let cone = "clamp.kind=wall";
+    succeed(folder.path(), &run("tensile-test", "gripped", &with(&[])));
+    succeed(folder.path(), &run("tensile-test", "wall", &with(&[cone])));
+    let [gripped, wall] = ["gripped", "wall"].map(|name| summary(&at(name)));
+    // The wall holds by friction and cohesion alone: nothing is glued to it.
+    assert!(value(&gripped, "held_share") > 0.05);
+    assert_eq!(value(&wall, "held_share"), 0.0);
+    let (most, least) = (value(&gripped, "strength"), value(&wall, "strength"));
+    assert!(least > 0.25 * most && least < 1.1 * most, "{least} {most}");
+    let momentum = wall["ledger"]["momentum_relative"].as_f64().unwrap();
+    assert!(momentum < 1e-9, "{momentum:e}");
+    // What the cone bears before it lets go is what is pulled.
+    let (header, rows) = table(&at("wall").join("history.csv"));
+    let column = |name: &str| header.iter().position(|n| n == name).unwrap();
+    let (clamp, cone) = (column("clamp_stress_1"), column("clamp_1_fz"));
+    let strongest = rows
+        .iter()
+        .max_by(|a, b| a[clamp].total_cmp(&b[clamp]))
+        .unwrap();
+    let area = std::f64::consts::PI * 0.025f64.powi(2);
+    let borne = -strongest[cone] / area;
+    assert!((borne / least - 1.0).abs() < 0.3, "{borne} {least}");
+    // The control: a tube without a slope lets it slide through, and the message says what would help.
+    let straight = with(&["clamp.kind=wall", "clamp.angle_degrees=0"]);
+    let done = colluvium(folder.path(), &run("tensile-test", "straight", &straight));
+    let message = String::from_utf8_lossy(&done.stderr).into_owned();
+    assert_eq!(done.status.code(), Some(1), "{message}");
+    for word in ["clamp.kind", "slides through", "clamp.height"] {
+        assert!(message.contains(word), "{message}");
+    }
+}
+
 /// A boulder of some 200 parcels for a few seconds; softer grains than the paper's allow longer steps.
 const BOULDER: [&str; 4] = [
     "coarse_graining=150",

@@ -9,7 +9,7 @@ use crate::scene::Scene;
 use crate::scene::world::Materials;
 use colluvium_dem::preparation::{SizeLaw, Weight};
 use colluvium_dem::{
-    Body, Domain, Freedom, Grain, Motion, Shape, Simulation, Solid, Threads, Wall,
+    Body, BoxMotion, Domain, Edge, Freedom, Grain, Motion, Shape, Simulation, Solid, Threads, Wall,
 };
 use nalgebra::Vector3;
 use std::time::Instant;
@@ -125,6 +125,7 @@ fn say_world(lines: &mut Lines, stand: &Stand) {
         );
         lines.say("clumps", &text);
     }
+    say_box(lines, stand);
     let g = world.gravity;
     let mut pulls = vec![format!("({:.4e}, {:.4e}, {:.4e}) m/s²", g.x, g.y, g.z)];
     if world.schedule.is_some() {
@@ -163,6 +164,51 @@ fn say_world(lines: &mut Lines, stand: &Stand) {
     }
     for crack in &world.cracks {
         lines.say("crack", &format!("no bonds in {crack}"));
+    }
+}
+
+/// The box, where it has no sides, moves or lets grains go.
+fn say_box(lines: &mut Lines, stand: &Stand) {
+    let (domain, world) = (&stand.setup.domain, &stand.world);
+    let lengths = domain.lengths();
+    let axes: Vec<&str> = ["x", "y", "z"]
+        .into_iter()
+        .zip(domain.periodic)
+        .filter_map(|(axis, periodic)| periodic.then_some(axis))
+        .collect();
+    if !axes.is_empty() {
+        let motion = match &world.box_motion {
+            BoxMotion::Rest => "at rest".to_owned(),
+            BoxMotion::Stretch { edges, .. } => {
+                let edge = |edge: &Edge| match edge {
+                    Edge::Rest => "rests".to_owned(),
+                    Edge::Speed(speed) => format!("grows at {speed} m/s"),
+                    Edge::Lengths(points) => format!("follows {} points", points.len()),
+                };
+                let [x, y, z] = [0, 1, 2].map(|k| edge(&edges[k]));
+                format!("x {x}, y {y}, z {z}")
+            }
+            BoxMotion::Servo(servo) => format!(
+                "all edges follow a pressure of {} Pa at {} 1/s at most",
+                servo.pressure, servo.rate
+            ),
+            BoxMotion::Shear { across, rate, .. } => format!(
+                "sheared along x across {} at {rate} 1/s (Lees & Edwards 1972)",
+                ["x", "y", "z"][*across]
+            ),
+        };
+        let text = format!(
+            "{:.4e} m x {:.4e} m x {:.4e} m, periodic along {}; {motion}",
+            lengths.x,
+            lengths.y,
+            lengths.z,
+            axes.join(", ")
+        );
+        lines.say("box", &text);
+    }
+    if let Some(outlet) = &world.outlet {
+        let text = format!("grains that leave {} are taken out", outlet.keep);
+        lines.say("outlet", &text);
     }
 }
 

@@ -214,7 +214,7 @@ impl Recipe for BoulderScene {
         let volume = 4.0 / 3.0 * PI * self.radius().powi(3);
         Expected {
             grains: self.comet().grains_in(volume, materials),
-            preparation: None,
+            preparation: Some(self.block().grain_steps(materials)),
             duration: self.impact.duration,
         }
     }

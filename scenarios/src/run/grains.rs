@@ -1,5 +1,6 @@
 //! A scene of grains of one's own.
 
+use super::world::boulders::{boulders, size_index};
 use super::world::fragments;
 use super::world::steps::{self, Around};
 use super::world::workshop::Surroundings;
@@ -168,6 +169,7 @@ impl Recipe for GrainsScene {
         let balls = |name: &String| self.clumps.get(name).map_or(1, |clump| clump.balls.len());
         let counts = self.prepare.iter().map(|step| match step.count {
             Some(count) => (count * step.clumps.as_ref().map_or(1, balls)) as f64,
+            None if step.points.is_some() => step.points.as_ref().map_or(0, Vec::len) as f64,
             None => step.mass.map_or(f64::NAN, |m| {
                 m / (materials.ingredients[0].density * volume)
             }),
@@ -270,6 +272,7 @@ impl Recipe for GrainsScene {
             let figure =
                 Figure::history("bonds", &columns, "Bonds that hold, and that have broken.");
             summary.figures.push(figure);
+            return Ok(vec![put_boulders(ran, summary)]);
         }
         Ok(Vec::new())
     }
@@ -277,6 +280,29 @@ impl Recipe for GrainsScene {
     fn compared(&self) -> Vec<&'static str> {
         vec!["kinetic_energy", "coordination", "centre_of_mass_z"]
     }
+}
+
+/// Boulders at the end: how many, the largest, the law of their sizes, and their table.
+fn put_boulders(ran: &mut Ran, summary: &mut Summary) -> Table {
+    // Of the volume of the grains alone: what is between them is the scene's own affair.
+    let table = boulders(&ran.simulation.clusters(), 1.0);
+    let diameters = table.column("diameter");
+    summary.put(
+        "boulders",
+        Quantity::new(diameters.len() as f64, "1").from("of two grains and more, joined by bonds"),
+    );
+    let largest = diameters.first().copied().unwrap_or(f64::NAN);
+    summary.put(
+        "largest_boulder",
+        Quantity::new(largest, "m").from("diameter of the ball of its grains' volume"),
+    );
+    let [index, error] = size_index(diameters);
+    let source = "a of N(> D) ∝ D^-a by the largest likelihood (Hill 1975); null for fewer than ten boulders";
+    summary.put(
+        "boulder_size_index",
+        Quantity::new(index, "1").with_error(error).from(source),
+    );
+    table
 }
 
 fn moves_not(boundaries: &crate::scene::world::BoundaryKeys) -> bool {

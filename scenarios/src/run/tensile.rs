@@ -179,7 +179,7 @@ impl Recipe for TensileScene {
         let sample = self.area() * self.sample.height + head;
         Expected {
             grains: self.samples as f64 * self.comet().grains_in(sample, materials),
-            preparation: None,
+            preparation: Some(self.samples as f64 * self.block().grain_steps(materials)),
             duration: self.longest(),
         }
     }
@@ -370,8 +370,14 @@ impl TensileScene {
         let up = Vector3::new(0.0, 0.0, 0.5 * self.sample.height);
         shop.place(UnitQuaternion::identity(), up)?;
         let relaxation = comet::relaxation(shop.materials);
-        // A wall must not cut through grains.
-        shop.trim(&self.shape(), self.clamp.kind == ClampKind::Wall)?;
+        match self.clamp.kind {
+            ClampKind::Gripped => shop.trim(&self.shape(), false)?,
+            // A wall must not cut through grains.
+            ClampKind::Wall => shop
+                .keep_where(&format!("{}, clear of the cone", self.shape()), |g| {
+                    self.is_clear_of_wall(g)
+                })?,
+        }
         let mut around = self.comet().last(origin)?;
         match self.clamp.kind {
             ClampKind::Gripped => {

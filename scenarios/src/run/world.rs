@@ -8,6 +8,7 @@
 //! The packing is the same to the bit whether it is made or read: a run starts from places, velocities and
 //! spins alone, with springs that are not yet stretched.
 
+pub mod boulders;
 pub mod build;
 pub mod course;
 pub mod fragments;

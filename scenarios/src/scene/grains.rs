@@ -124,6 +124,14 @@ impl GrainsScene {
             };
             step.step(at)?;
             if let Some(name) = step
+                .material
+                .as_ref()
+                .filter(|n| !self.grains.contains_key(*n))
+            {
+                let known: Vec<&str> = self.grains.keys().map(String::as_str).collect();
+                return Err(at.refuse("material", name, format!("one of {}", known.join(", "))));
+            }
+            if let Some(name) = step
                 .clumps
                 .as_ref()
                 .filter(|n| !self.clumps.contains_key(*n))

@@ -87,3 +87,34 @@ pub fn table(path: &Path) -> (Vec<String>, Vec<Vec<f64>>) {
         .collect();
     (header, rows)
 }
+
+/// Columns of a CSV table by name.
+#[derive(Debug)]
+pub struct Columns(Vec<(String, Vec<f64>)>);
+
+impl Columns {
+    /// Of a file.
+    pub fn read(path: &Path) -> Columns {
+        let (header, rows) = table(path);
+        let column = |k: usize| rows.iter().map(|row| row[k]).collect();
+        let named = header.into_iter().enumerate();
+        Columns(named.map(|(k, name)| (name, column(k))).collect())
+    }
+
+    /// A column, where there is one of that name.
+    pub fn find(&self, name: &str) -> Option<&[f64]> {
+        let found = self.0.iter().find(|(known, _)| known == name);
+        found.map(|(_, values)| values.as_slice())
+    }
+
+    /// A column.
+    pub fn of(&self, name: &str) -> &[f64] {
+        let found = self.find(name);
+        found.unwrap_or_else(|| panic!("no column {name}"))
+    }
+
+    /// Its last value.
+    pub fn last(&self, name: &str) -> f64 {
+        *self.of(name).last().unwrap()
+    }
+}

@@ -4,6 +4,7 @@
 //! Vertices that coincide are welded and triangles without area dropped when it is made. Grains are found
 //! near triangles through a tree of bounding boxes.
 
+mod inside;
 mod touches;
 mod triangle;
 mod way_out;

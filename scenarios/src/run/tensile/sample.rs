@@ -5,7 +5,7 @@ use crate::run::comet_block::CometBlock;
 use crate::scene::TensileScene;
 use crate::scene::world::Materials;
 use colluvium_dem::walls::{Ends, Frustum};
-use colluvium_dem::{Region, Side, Wall};
+use colluvium_dem::{Grain, Region, Side, Wall};
 use nalgebra::Vector3;
 use std::f64::consts::PI;
 
@@ -114,6 +114,20 @@ impl TensileScene {
             self.cone(0.0),
             Region::Outside(Box::new(self.cone(depth))),
         ])
+    }
+
+    /// Whether a grain belongs to a sample that a wall holds: its centre lies within, and no part of it in the wall. Below
+    /// the cone the cross-section is that of a gripped sample: cut by centres.
+    pub(super) fn is_clear_of_wall(&self, grain: &Grain) -> bool {
+        let p = grain.position;
+        let (out, up) = (p.x.hypot(p.y) - self.radius(), p.z - self.clamp_foot());
+        let (sin, cos) = self.clamp.angle_degrees.to_radians().sin_cos();
+        let from_wall = if out * sin + up * cos < 0.0 {
+            out.hypot(up)
+        } else {
+            up * sin - out * cos
+        };
+        self.shape().contains(&p) && from_wall >= grain.radius
     }
 
     /// The clamp of sample `k` as a wall.

@@ -27,6 +27,9 @@ use std::time::Instant;
 /// Steps between two looks at the clock.
 const STEPS_PER_LOOK: u64 = 100;
 
+/// Grains whose attraction by all others is summed directly at the end, as a check of the tree.
+const TREE_CHECKED: usize = 2000;
+
 /// Name of the recipe's memory in a checkpoint.
 const STATE: &str = "recipe/state";
 
@@ -132,6 +135,9 @@ fn make(recipe: &dyn Recipe, materials: &Materials, under: &Under) -> Result<Sto
     let shop = Workshop::new(materials, keys, threads, &mut watch);
     let mut shop = shop.tell(&under.directory.journal);
     let made = recipe.prepare(&mut shop, &under.scene.origin);
+    if made.is_ok() {
+        shop.compare_sizes();
+    }
     let (packing, notes, grain_steps) = (shop.packing, shop.notes, shop.grain_steps);
     bar.clear();
     if crate::interruption::requested() {
@@ -155,7 +161,7 @@ pub fn run(recipe: &dyn Recipe, under: &mut Under) -> Result<Findings, Failure> 
     let threads = under.threads_of_one_run();
     let stand = Stand::new(recipe, &stored.packing, &materials, threads, &origin)?;
     let refused = |error: SetupError| Failure::Input(format!("{origin}: {error}"));
-    let mut history = History::new(&stand.world, recipe);
+    let mut history = History::new(&stand, recipe);
     let mut averages = LiveAverages::new(recipe, &stand, &origin)?;
     let mut state = Vec::new();
     let mut simulation = match &under.resumed {
@@ -364,6 +370,20 @@ fn findings(
         summary.put(
             "broken_bond_share",
             Quantity::new(bonds.broken_share(), "1").from("of the bonds at the start"),
+        );
+    }
+    if let Some(error) = ran.simulation.self_gravity_error(TREE_CHECKED) {
+        let own = ran.stand.world.own_gravity.map_or(0.0, |own| own.opening);
+        let source = format!(
+            "tree of opening {own} against the direct sum at the end, over at most {TREE_CHECKED} grains, of the rms acceleration"
+        );
+        summary.put(
+            "self_gravity_rms_error",
+            Quantity::new(error.rms, "1").from(&source),
+        );
+        summary.put(
+            "self_gravity_largest_error",
+            Quantity::new(error.largest, "1").from(&source),
         );
     }
     summary.preparation.clone_from(&stored.notes);

@@ -1,10 +1,13 @@
-//! Rows of `history.csv`: the whole of the grains in time, the mean force on each wall since the row before,
-//! what the scene's own recipe looks at.
+//! Rows of `history.csv`: the whole of the grains in time, what walls and bodies have taken since the row before,
+//! the periodic box, what the scene's own recipe looks at.
 
-use super::build::World;
+mod periodic_box;
+mod walls;
+
+use super::build::Stand;
 use super::recipe::Recipe;
 use crate::table::Table;
-use colluvium_dem::{Record, Simulation, Snapshot};
+use colluvium_dem::{Record, Simulation, Snapshot, Wall};
 use nalgebra::Vector3;
 
 /// Columns of every scene.
@@ -51,12 +54,20 @@ const BODY: [(&str, &str); 19] = [
     ("tz", "N m"),
 ];
 
-/// Columns of the ledger.
-const LEDGER: [(&str, &str); 5] = [
+/// Columns of the ledger: heat of the contacts, work since the start (of walls and grains that move as they are told;
+/// of a periodic box that moves; of uniform gravity; of fields of gravity; of steady loads; of bonds, what they store
+/// counted against it), and what is not accounted for.
+const LEDGER: [(&str, &str); 11] = [
     ("normal_loss", "J"),
     ("tangential_loss", "J"),
     ("rolling_loss", "J"),
     ("twisting_loss", "J"),
+    ("drive_work", "J"),
+    ("box_work", "J"),
+    ("gravity_work", "J"),
+    ("field_work", "J"),
+    ("load_work", "J"),
+    ("bond_work", "J"),
     ("ledger_error", "1"),
 ];
 
@@ -67,15 +78,16 @@ const SAVED: &str = "history/rows";
 #[derive(Clone, Debug)]
 pub struct History {
     columns: Vec<(String, &'static str)>,
-    walls: usize,
+    walls: Vec<(String, Wall)>,
+    in_box: bool,
     ledger: bool,
     rows: Vec<Vec<f64>>,
 }
 
 impl History {
     /// No rows yet.
-    pub fn new(world: &World, recipe: &dyn Recipe) -> History {
-        let ledger = recipe.output().ledger;
+    pub fn new(stand: &Stand, recipe: &dyn Recipe) -> History {
+        let (world, ledger) = (&stand.world, recipe.output().ledger);
         let named = |list: &[(&str, &'static str)]| -> Vec<(String, &'static str)> {
             list.iter().map(|(n, u)| ((*n).to_owned(), *u)).collect()
         };
@@ -83,16 +95,19 @@ impl History {
         if ledger {
             columns.extend(named(&LEDGER));
         }
-        for (name, _) in &world.walls {
-            columns.extend(["fx", "fy", "fz"].map(|axis| (format!("{name}_{axis}"), "N")));
+        let in_box = periodic_box::stands(stand);
+        if in_box {
+            columns.extend(periodic_box::columns());
         }
+        columns.extend(walls::columns(&world.walls));
         for (name, _) in &world.bodies {
             columns.extend(BODY.map(|(column, unit)| (format!("{name}_{column}"), unit)));
         }
         columns.extend(recipe.columns());
         History {
             columns,
-            walls: world.walls.len(),
+            walls: world.walls.clone(),
+            in_box,
             ledger,
             rows: Vec::new(),
         }
@@ -114,7 +129,7 @@ impl History {
         record.numbers.insert(SAVED.into(), flat);
     }
 
-    /// Adds the row of this instant; forces on walls are means since the row before.
+    /// Adds the row of this instant; forces on walls and bodies are means since the row before.
     pub fn look(
         &mut self,
         recipe: &dyn Recipe,
@@ -154,29 +169,29 @@ impl History {
             (bonds.torn + bonds.sheared) as f64,
         ];
         if self.ledger {
-            let booked = simulation.energy_ledger().map_or([f64::NAN; 5], |ledger| {
+            let booked = simulation.energy_ledger().map_or([f64::NAN; 11], |ledger| {
                 let lost = ledger.dissipated();
                 [
                     lost.normal,
                     lost.tangential,
                     lost.rolling,
                     lost.twisting,
+                    ledger.drive,
+                    ledger.boundary,
+                    ledger.gravity,
+                    ledger.fields.work,
+                    ledger.loads,
+                    ledger.bonds.work,
                     ledger.error(),
                 ]
             });
             // A channel that nothing went through is 0, not -0.
             row.extend(booked.map(|x| x + 0.0));
         }
-        for wall in 0..self.walls {
-            let taken = simulation.wall_taken(wall);
-            let mean = if taken.duration > 0.0 {
-                taken.impulse / taken.duration
-            } else {
-                simulation.wall_load(wall).force
-            };
-            simulation.forget_wall_taken(wall);
-            row.extend(mean.iter().map(|f| f + 0.0));
+        if self.in_box {
+            periodic_box::look(simulation, &mut row);
         }
+        walls::look(&self.walls, simulation, &mut row);
         for (body, sample) in seen.bodies.iter().enumerate() {
             let taken = simulation.body_taken(body);
             let mean = |sum: Vector3<f64>, now: Vector3<f64>| {

@@ -3,8 +3,8 @@
 use super::workshop::{Surroundings, Workshop, with_friction};
 use crate::failure::Failure;
 use crate::scene::world::{ClumpKeys, Place, PrepareKeys, PrepareKind};
-use colluvium_dem::Wall;
 use colluvium_dem::preparation::{Aggregate, Amount, CentralCompaction, Relaxation, Stages};
+use colluvium_dem::{Grain, Wall};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 
@@ -98,6 +98,36 @@ fn step(
             }
             _ => shop.insert(step.region, amount, velocity),
         },
+        (PrepareKind::Put, _) => {
+            let number = match &keys.material {
+                Some(name) => shop.materials.number(name, "material", at)?,
+                None => shop.materials.ingredients[0].material,
+            };
+            let kind = shop
+                .materials
+                .ingredients
+                .iter()
+                .find(|i| i.material == number);
+            let Some(kind) = kind else {
+                let name = keys.material.clone().unwrap_or_default();
+                return Err(at
+                    .refuse(
+                        "material",
+                        name,
+                        "a kind of grains with a part of the volume",
+                    )
+                    .into());
+            };
+            let (mean, density) = (kind.sizes.mean(), kind.density);
+            let grain = |(point, radius): ([f64; 3], Option<f64>)| Grain {
+                velocity,
+                material: number,
+                ..Grain::at_rest(point.into(), radius.unwrap_or(mean), density)
+            };
+            let grains = keys.places(at)?.into_iter().map(grain).collect();
+            shop.put(grains);
+            Ok(())
+        }
         (PrepareKind::Pour, Some(amount)) => {
             let surroundings = Surroundings {
                 speed: velocity.norm(),

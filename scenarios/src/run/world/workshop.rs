@@ -4,6 +4,7 @@
 //! and takes it back. It has a time step of its own, from its own speeds.
 
 mod clumps;
+mod report;
 
 use super::fragments;
 use crate::failure::Failure;
@@ -11,9 +12,8 @@ use crate::journal::Journal;
 use crate::scene::world::Materials;
 use crate::summary::Note;
 use colluvium_dem::preparation::{
-    Aggregate, Amount, CentralCompaction, Insertion, Jamming, Packing, PackingReport, Pouring,
-    Relaxation, RestMeasures, Stages, TRIES, compact, grow, insert_loose, jam, pour, relax,
-    settle_in_stages,
+    Aggregate, Amount, CentralCompaction, Insertion, Jamming, Packing, Pouring, Relaxation,
+    RestMeasures, Stages, TRIES, compact, grow, insert_loose, jam, pour, relax, settle_in_stages,
 };
 use colluvium_dem::timestep::{Conditions, Shares};
 use colluvium_dem::{
@@ -268,6 +268,12 @@ impl<'a> Workshop<'a> {
         Ok(())
     }
 
+    /// Puts grains where they are told to be.
+    pub fn put(&mut self, grains: Vec<Grain>) {
+        self.note("put", format!("{} grains at given places", grains.len()));
+        self.packing.grains.extend(grains);
+    }
+
     /// Pours grains from a source until they rest.
     pub fn pour(
         &mut self,
@@ -476,6 +482,22 @@ impl<'a> Workshop<'a> {
         self.check_left()
     }
 
+    /// Keeps grains of which a rule says so; what it says in words is noted.
+    pub fn keep_where(
+        &mut self,
+        words: &str,
+        rule: impl Fn(&Grain) -> bool,
+    ) -> Result<(), Failure> {
+        let stays = self.packing.grains.iter().map(rule).collect();
+        let gone = self.packing.keep_those(stays);
+        let left = self.packing.grains.len();
+        self.note(
+            "trim",
+            format!("{gone} grains taken away, {left} left, in {words}"),
+        );
+        self.check_left()
+    }
+
     fn check_left(&self) -> Result<(), Failure> {
         if self.packing.grains.is_empty() {
             return Err(Failure::Run("preparation: no grains are left".into()));
@@ -507,42 +529,6 @@ impl<'a> Workshop<'a> {
     /// Opens all axes of the box.
     pub fn open(&mut self) {
         self.packing.domain.periodic = [false; 3];
-    }
-
-    /// Where a packing is measured unless its scene knows better: all of a periodic box; else a ball about
-    /// the centre of mass that goes six tenths of the way to the nearest side of the block around all grains.
-    pub fn middle(&self) -> Region {
-        let packing = &self.packing;
-        if packing.domain.periodic == [true; 3] || packing.grains.is_empty() {
-            return Region::Everywhere;
-        }
-        let center = packing.center();
-        let to_side =
-            |grain: &Grain, k: usize, sign: f64| sign * (grain.position - center)[k] + grain.radius;
-        let side = |k: usize, sign: f64| {
-            let reaches = packing.grains.iter().map(|g| to_side(g, k, sign));
-            reaches.fold(0.0, f64::max)
-        };
-        let nearest = (0..3)
-            .flat_map(|k| [side(k, 1.0), side(k, -1.0)])
-            .fold(f64::INFINITY, f64::min);
-        Region::Ball {
-            center,
-            radius: 0.6 * nearest,
-        }
-    }
-
-    /// Measures the packing in a region, rest against an acceleration (m/s²).
-    pub fn measure(
-        &mut self,
-        around: &Surroundings,
-        region: &Region,
-        acceleration: f64,
-    ) -> Result<PackingReport, Failure> {
-        let mut simulation = self.simulation(around)?;
-        let report = PackingReport::of(&mut simulation, region, acceleration).map_err(refused)?;
-        self.note("packing", &report);
-        Ok(report)
     }
 }
 

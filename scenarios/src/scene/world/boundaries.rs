@@ -1,5 +1,6 @@
 //! `[boundaries]`: the box, its periodic axes, how it moves, and where grains leave the world.
 
+use super::gravity::read_rows;
 use super::{Place, RegionKeys, Triple, region};
 use crate::scene::SceneError;
 use colluvium_dem::{BoxMotion, Domain, Edge, Outlet, StressServo};
@@ -31,6 +32,8 @@ pub struct BoundaryKeys {
 pub enum BoxMotionKind {
     /// Edges grow at `speeds`.
     Stretch,
+    /// Lengths of the edges follow a `file`.
+    Table,
     /// All edges follow `pressure`.
     Servo,
     /// Planes across y or z slide along x at a shear `rate`.
@@ -46,6 +49,10 @@ pub struct BoxMotionKeys {
     /// Speeds at which the edges grow (m/s), of stretch.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub speeds: Option<Triple>,
+    /// CSV file of table with the columns t, x, y, z (s, m): rising times, lengths of the edges, straight lines between
+    /// them.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
     /// Pressure wanted (Pa), of servo.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub pressure: Option<f64>,
@@ -60,7 +67,7 @@ pub struct BoxMotionKeys {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 1, "maximum" = 2))]
     pub across: Option<usize>,
-    /// Whether grains are carried where the rate changes, of stretch and shear; left out: yes.
+    /// Whether grains are carried where the rate changes, of stretch, table and shear; left out: yes.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub carry: Option<bool>,
 }
@@ -110,11 +117,16 @@ impl BoundaryKeys {
         let Some(keys) = &self.motion else {
             return Ok(BoxMotion::Rest);
         };
+        keys.check_unread(at)?;
         Ok(match keys.kind {
             BoxMotionKind::Stretch => BoxMotion::Stretch {
                 edges: at
                     .need(&keys.speeds, "speeds", "three speeds in m/s")?
                     .map(|v| if v == 0.0 { Edge::Rest } else { Edge::Speed(v) }),
+                carry: keys.carry.unwrap_or(true),
+            },
+            BoxMotionKind::Table => BoxMotion::Stretch {
+                edges: self.edges(keys, at)?,
                 carry: keys.carry.unwrap_or(true),
             },
             BoxMotionKind::Servo => BoxMotion::Servo(StressServo {
@@ -130,6 +142,32 @@ impl BoundaryKeys {
         })
     }
 
+    /// Lengths of the edges from a file.
+    fn edges(&self, keys: &BoxMotionKeys, at: Place) -> Result<[Edge; 3], SceneError> {
+        let file = at.need(&keys.file, "file", "a CSV file")?;
+        let rows = read_rows(&file, ["t", "x", "y", "z"]).map_err(|why| {
+            let range = format!("a CSV file with the columns t, x, y, z ({why})");
+            at.refuse("file", &file, range)
+        })?;
+        for (k, axis) in ["x", "y", "z"].iter().enumerate() {
+            let (length, first) = (self.upper[k] - self.lower[k], rows[0][k + 1]);
+            if (first / length - 1.0).abs() > 1e-9 {
+                let range = format!(
+                    "a file whose first row has the lengths of the box: {axis} is {first}, not {length}"
+                );
+                return Err(at.refuse("file", &file, range));
+            }
+        }
+        Ok([0, 1, 2].map(|k| {
+            let length = self.upper[k] - self.lower[k];
+            let stays = |row: &[f64; 4]| (row[k + 1] / length - 1.0).abs() < 1e-12;
+            if rows.iter().all(stays) {
+                return Edge::Rest;
+            }
+            Edge::Lengths(rows.iter().map(|row| (row[0], row[k + 1])).collect())
+        }))
+    }
+
     /// Where grains may be.
     pub fn outlet(&self, origin: &str) -> Result<Option<Outlet>, SceneError> {
         let Some(keys) = &self.outlet else {
@@ -143,5 +181,27 @@ impl BoundaryKeys {
             keep: region(&keys.keep, at)?,
             every: keys.every,
         }))
+    }
+}
+
+impl BoxMotionKeys {
+    fn check_unread(&self, at: Place) -> Result<(), SceneError> {
+        use BoxMotionKind::{Servo, Shear, Stretch, Table};
+        let only = |given: bool, kinds: &[BoxMotionKind]| given && !kinds.contains(&self.kind);
+        at.unread(
+            &[
+                ("speeds", only(self.speeds.is_some(), &[Stretch])),
+                ("file", only(self.file.is_some(), &[Table])),
+                ("pressure", only(self.pressure.is_some(), &[Servo])),
+                ("rate", only(self.rate.is_some(), &[Servo, Shear])),
+                ("every", only(self.every.is_some(), &[Servo])),
+                ("across", only(self.across.is_some(), &[Shear])),
+                (
+                    "carry",
+                    only(self.carry.is_some(), &[Stretch, Table, Shear]),
+                ),
+            ],
+            &format!("a box motion of the kind {:?}", self.kind).to_lowercase(),
+        )
     }
 }

@@ -1,5 +1,6 @@
 //! How grains are put in place: `[[prepare]]`, one step after the other.
 
+use super::gravity::read_rows;
 use super::{Place, RegionKeys, Triple, region};
 use crate::scene::SceneError;
 use colluvium_dem::Region;
@@ -13,6 +14,8 @@ use serde::{Deserialize, Serialize};
 pub enum PrepareKind {
     /// Loose grains at random places `within`, none touching another.
     Insert,
+    /// Grains at given `points`, or where the rows of a `file` have them.
+    Put,
     /// Grains poured from `within` between the walls, until they rest.
     Pour,
     /// Everything comes to rest between the walls.
@@ -51,6 +54,18 @@ pub struct PrepareKeys {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 1, "maximum" = 20000000))]
     pub count: Option<usize>,
+    /// Centres of grains of put (m).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub points: Option<Vec<Triple>>,
+    /// Their radii (m); left out: the mean of their kind's law.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub radii: Option<Vec<f64>>,
+    /// CSV file of put with the columns radius, x, y, z (m).
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+    /// Kind of the grains of put; left out: the first.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub material: Option<String>,
     /// Solid fraction of insert, compact.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 0.75))]
@@ -59,7 +74,7 @@ pub struct PrepareKeys {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e15))]
     pub mass: Option<f64>,
-    /// Velocity of insert and pour (m/s); left out: at rest.
+    /// Velocity of insert, put and pour (m/s); left out: at rest.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub velocity: Option<Triple>,
     /// Time from batch to batch of pour (s); left out: in which grains leave the source.
@@ -135,7 +150,7 @@ impl PrepareKeys {
     /// Checks a step and what it needs.
     pub fn step(&self, at: Place) -> Result<PrepareStep<'_>, SceneError> {
         use PrepareKind::{
-            Compact, Glue, Grow, Insert, Jam, Place as Put, Pour, Relax, Scale, Stages, Trim,
+            Compact, Glue, Grow, Insert, Jam, Place as Move, Pour, Put, Relax, Scale, Stages, Trim,
         };
         let kind = self.r#do;
         let within = format!("{}.within", at.section);
@@ -177,6 +192,9 @@ impl PrepareKeys {
         if [Jam, Grow].contains(&kind) {
             at.need(&self.count, "count", "a number of grains")?;
         }
+        if kind == Put {
+            self.places(at)?;
+        }
         if kind == Compact {
             at.need(&self.solid_fraction, "solid_fraction", "in (0, 0.75]")?;
             at.need(&self.radius, "radius", "of the ball it is measured in, m")?;
@@ -207,10 +225,17 @@ impl PrepareKeys {
                 ),
                 ("mass", only(self.mass.is_some(), &[Insert, Pour])),
                 ("clumps", only(self.clumps.is_some(), &[Insert, Pour])),
-                ("velocity", only(self.velocity.is_some(), &[Insert, Pour])),
+                (
+                    "velocity",
+                    only(self.velocity.is_some(), &[Insert, Put, Pour]),
+                ),
+                ("points", only(self.points.is_some(), &[Put])),
+                ("radii", only(self.radii.is_some(), &[Put])),
+                ("file", only(self.file.is_some(), &[Put])),
+                ("material", only(self.material.is_some(), &[Put])),
                 ("interval", only(self.interval.is_some(), &[Pour])),
                 ("gravities", only(self.gravities.is_some(), &[Stages])),
-                ("point", only(self.point.is_some(), &[Compact, Put])),
+                ("point", only(self.point.is_some(), &[Compact, Move])),
                 ("radius", only(self.radius.is_some(), &[Compact])),
                 (
                     "accelerations",
@@ -222,7 +247,7 @@ impl PrepareKeys {
                 ("growth", only(self.growth.is_some(), &[Grow])),
                 ("whole", only(self.whole.is_some(), &[Trim])),
                 ("factor", only(self.factor.is_some(), &[Scale])),
-                ("turn_degrees", only(self.turn_degrees.is_some(), &[Put])),
+                ("turn_degrees", only(self.turn_degrees.is_some(), &[Move])),
                 ("friction", only(self.friction.is_some(), &moving)),
             ],
             &format!("the step {kind:?}").to_lowercase(),
@@ -232,6 +257,59 @@ impl PrepareKeys {
             region,
             amount,
         })
+    }
+
+    /// Where put puts grains: centres (m), with radii (m) where they are given.
+    pub fn places(&self, at: Place) -> Result<Vec<(Triple, Option<f64>)>, SceneError> {
+        let places: Vec<(Triple, Option<f64>)> = match (&self.points, &self.file) {
+            (Some(_), Some(_)) => {
+                return Err(SceneError::Conflict {
+                    file: at.origin.to_owned(),
+                    first: at.key("points"),
+                    second: at.key("file"),
+                });
+            }
+            (None, None) => return Err(at.missing("points", "centres of grains in m, or a file")),
+            (None, Some(file)) => {
+                at.unread(&[("radii", self.radii.is_some())], "a step with a `file`")?;
+                let rows = read_rows(file, ["radius", "x", "y", "z"]).map_err(|why| {
+                    let range = format!("a CSV file with the columns radius, x, y, z ({why})");
+                    at.refuse("file", file, range)
+                })?;
+                let place = |[r, x, y, z]: [f64; 4]| ([x, y, z], Some(r));
+                rows.into_iter().map(place).collect()
+            }
+            (Some(points), None) => {
+                let radii = match &self.radii {
+                    Some(radii) if radii.len() != points.len() => {
+                        let range = format!("as many as points, {}", points.len());
+                        return Err(at.refuse("radii", format!("{} numbers", radii.len()), range));
+                    }
+                    Some(radii) => radii.iter().copied().map(Some).collect(),
+                    None => vec![None; points.len()],
+                };
+                points.iter().copied().zip(radii).collect()
+            }
+        };
+        let key = if self.file.is_some() {
+            "file"
+        } else {
+            "points"
+        };
+        if places.is_empty() {
+            return Err(at.refuse(key, "nothing", "a grain at least"));
+        }
+        for (k, (point, radius)) in places.iter().enumerate() {
+            if !point.iter().all(|x| x.abs() < 1e6) {
+                let value = format!("grain {k} at {point:?}");
+                return Err(at.refuse(key, value, "within 1e6 m of the origin"));
+            }
+            if !radius.is_none_or(|r| r > 0.0 && r < 1e6) {
+                let value = format!("grain {k} of radius {}", radius.unwrap_or(f64::NAN));
+                return Err(at.refuse(key, value, "a radius in (0, 1e6) m"));
+            }
+        }
+        Ok(places)
     }
 
     /// How an aggregate grows.

@@ -1,11 +1,15 @@
-//! Parts of space: `within = [{ shape = "cylinder", … }, { shape = "block", … }]` is where all of these are.
+//! Parts of space: `within = [{ shape = "cylinder", … }, { shape = "block", … }]` is where all of these are,
+//! `{ shape = "any", of = [ … ] }` where any is.
 
 use super::{Place, Triple};
+use crate::mesh_files;
 use crate::scene::SceneError;
 use colluvium_dem::Region;
 use nalgebra::Vector3;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
+use std::path::Path;
+use std::sync::Arc;
 
 /// Shape of a region.
 #[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
@@ -21,6 +25,10 @@ pub enum RegionKind {
     Cylinder,
     /// A truncated cone from `point` along `axis` over `length`, of `radii` at both ends.
     Frustum,
+    /// What the closed mesh of `file` encloses (STL, OBJ, PLY, VTK, VTU, VTP, Gmsh).
+    Mesh,
+    /// Where any of the regions in `of` is.
+    Any,
 }
 
 /// A part of space (m).
@@ -56,6 +64,16 @@ pub struct RegionKeys {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
     pub thickness: Option<f64>,
+    /// File of a mesh.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub file: Option<String>,
+    /// Metres in a unit of that file; left out: 1.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
+    pub unit: Option<f64>,
+    /// The regions of any.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    pub of: Vec<RegionKeys>,
     /// What is meant is all that is not in it.
     #[serde(default, skip_serializing_if = "std::ops::Not::not")]
     pub outside: bool,
@@ -97,8 +115,32 @@ impl RegionKeys {
                 length: at.need(&self.length, "length", "a length in m")?,
                 radii: at.need(&self.radii, "radii", "two radii in m")?,
             },
+            RegionKind::Mesh => {
+                let file = at.need(&self.file, "file", "a mesh file")?;
+                let mesh = mesh_files::read_mesh(Path::new(&file), self.unit.unwrap_or(1.0));
+                let mesh = mesh.map_err(|why| {
+                    at.refuse("file", &file, format!("the file of a closed mesh ({why})"))
+                })?;
+                if !mesh.is_closed() {
+                    return Err(at.refuse("file", &file, "the file of a mesh that is closed"));
+                }
+                Region::Mesh(Arc::new(mesh))
+            }
+            RegionKind::Any => {
+                if self.of.is_empty() {
+                    return Err(at.missing("of", "a list of regions"));
+                }
+                let parts = self.of.iter().enumerate().map(|(k, part)| {
+                    let section = at.key(&format!("of[{k}]"));
+                    part.region(Place {
+                        section: &section,
+                        ..at
+                    })
+                });
+                Region::Any(parts.collect::<Result<_, _>>()?)
+            }
         };
-        use RegionKind::{Ball, Block, Cylinder, Frustum, Slab};
+        use RegionKind::{Any, Ball, Block, Cylinder, Frustum, Mesh, Slab};
         let only = |given: bool, shapes: &[RegionKind]| given && !shapes.contains(&self.shape);
         at.unread(
             &[
@@ -116,6 +158,9 @@ impl RegionKeys {
                 ("length", only(self.length.is_some(), &[Frustum])),
                 ("radius", only(self.radius.is_some(), &[Ball, Cylinder])),
                 ("thickness", only(self.thickness.is_some(), &[Slab])),
+                ("file", only(self.file.is_some(), &[Mesh])),
+                ("unit", only(self.unit.is_some(), &[Mesh])),
+                ("of", only(!self.of.is_empty(), &[Any])),
             ],
             &format!("a {:?}", self.shape).to_lowercase(),
         )?;
