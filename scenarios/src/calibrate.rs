@@ -61,7 +61,12 @@ pub fn calibrate(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> 
     let threads = options.threads.unwrap_or_else(rayon::current_num_threads);
     let (directory, before) = run::open_directory(scene, options, "calibrate")?;
     if before.is_some_and(|s| s.status == Status::Done) {
-        return run::already_done(&directory);
+        if Campaign::read(directory.path()).is_some() {
+            return run::already_done(&directory);
+        }
+        // Its record is of another version, or gone: the runs stay, and what they say is worked out again.
+        let note = format!("{CAMPAIGN} cannot be read: evaluated again from its runs");
+        directory.journal.note(&note);
     }
     let before = finished_angles(&directory, options.resume)?;
     if options.resume {
@@ -421,6 +426,7 @@ fn rheology_file(
         diameter: body.grains.diameter,
         solid_fraction: fit.solid_fraction,
         solid_fraction_error: Some(fit.solid_fraction_error),
+        solid_fraction_of_i: fit.solid_fraction_of_i,
         grain_density: Some(body.grains.density),
         valid_i: Some(fit.valid_i),
         table: friction_table(&result.points),

@@ -4,6 +4,7 @@ mod normal_stress;
 
 use crate::map::MapFile;
 use crate::scene::{SceneError, check_continuum_keys, layers};
+use colluvium_coupling::calibration::SolidFractionFit;
 use serde::{Deserialize, Serialize};
 use std::path::{Path, PathBuf};
 use toml::{Table, Value};
@@ -68,6 +69,9 @@ pub struct RheologyFile {
     /// Its standard error.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub solid_fraction_error: Option<f64>,
+    /// φ(I) = intercept − slope I of the same layers; a continuum carries one φ, this says how far it is from the truth.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub solid_fraction_of_i: Option<SolidFractionFit>,
     /// Density of the grains (kg/m³).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub grain_density: Option<f64>,
@@ -190,6 +194,15 @@ impl RheologyFile {
                 self.solid_fraction
             ));
         }
+        if let Some(law) = &self.solid_fraction_of_i {
+            let range = 0.0..=1.0;
+            if !(range.contains(&law.intercept) && law.slope.is_finite()) {
+                return Err(format!(
+                    "key `solid_fraction_of_i`: intercept = {}, slope = {} is not allowed; allowed: an intercept in [0, 1], a finite slope",
+                    law.intercept, law.slope
+                ));
+            }
+        }
         if let Some(density) = self.grain_density {
             least("grain_density", density, 0.0)?;
         }
@@ -212,7 +225,8 @@ impl RheologyFile {
         format!(
             "# μ(I) law fitted by colluvium calibrate. SI units.\n\
              # μ = |τ|/p with p = trace/3; [mu_zz] holds the fit for |τ|/σ_zz instead.\n\
-             # Outside valid_i (inertial numbers) the law was not measured.\n{body}"
+             # Outside valid_i (inertial numbers) the law was not measured.\n\
+             # [solid_fraction_of_i]: phi = intercept - slope I.\n{body}"
         )
     }
 

@@ -223,6 +223,11 @@ fn a_stopped_campaign_keeps_its_angles_and_ends_the_same() {
     // A finished campaign is not made again.
     let again = succeed(folder.path(), &arguments("calibrate", "parts", &resumed));
     assert!(again.contains("already done"), "{again}");
+    // Its record is of a version that this one does not read: its runs are not made again, and say the same.
+    std::fs::write(parts.join("campaign.json"), "{}").unwrap();
+    succeed(folder.path(), &arguments("calibrate", "parts", &resumed));
+    assert!(log().contains("evaluated again"), "{}", log());
+    assert_eq!(hash(&parts), hash(&whole));
     // Its bed is softer than the thesis' and LAMMPS' material: nothing published is set beside it.
     let page = std::fs::read_to_string(parts.join("report.html")).unwrap();
     assert!(!page.contains("Table 2.6 beside") && !page.contains("LAMMPS"));

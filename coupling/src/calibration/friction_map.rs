@@ -83,9 +83,20 @@ pub struct Interpolated {
     pub valid_i: [f64; 2],
 }
 
+/// An axis of the grid.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize)]
+pub enum Axis {
+    /// β.
+    Beta,
+    /// μ_R.
+    RollingFriction,
+}
+
 /// Misses of the grid points that can be left out.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
 pub struct Missed {
+    /// Along which it lies between its neighbours.
+    pub along: Axis,
     /// β.
     pub beta: f64,
     /// μ_R.
@@ -107,6 +118,19 @@ pub struct InterpolationError {
     pub repose: f64,
     /// Of φ.
     pub solid_fraction: f64,
+}
+
+/// Of all that is missed; 0 of nothing.
+fn root_mean_square(missed: &[Missed]) -> InterpolationError {
+    let of = |part: &dyn Fn(&Missed) -> f64| {
+        let squares: f64 = missed.iter().map(|m| part(m).powi(2)).sum();
+        (squares / missed.len().max(1) as f64).sqrt()
+    };
+    InterpolationError {
+        friction: std::array::from_fn(|k| of(&|m| m.friction[k])),
+        repose: of(&|m| m.repose),
+        solid_fraction: of(&|m| m.solid_fraction),
+    }
 }
 
 /// What is wrong with a map, or with a place on it.
@@ -375,12 +399,13 @@ impl FrictionMap {
         for b in 0..self.betas.len() {
             for m in 0..self.mu_rs.len() {
                 let here = self.cell(b, m);
-                let mut compare = |low: &MapCell, high: &MapCell, share: f64| {
+                let mut compare = |along: Axis, low: &MapCell, high: &MapCell, share: f64| {
                     let mut mixed = Mixture::default();
                     mixed.add(low, 1.0 - share);
                     mixed.add(high, share);
                     let of = |k: usize| mixed.curve.friction[k] - here.curve.friction[k];
                     all.push(Missed {
+                        along,
                         beta: here.beta,
                         mu_r: here.mu_r,
                         friction: std::array::from_fn(of),
@@ -393,11 +418,11 @@ impl FrictionMap {
                 };
                 if b > 0 && b + 1 < self.betas.len() {
                     let (low, high) = (self.cell(b - 1, m), self.cell(b + 1, m));
-                    compare(low, high, share(&self.betas, b));
+                    compare(Axis::Beta, low, high, share(&self.betas, b));
                 }
                 if m > 0 && m + 1 < self.mu_rs.len() {
                     let (low, high) = (self.cell(b, m - 1), self.cell(b, m + 1));
-                    compare(low, high, share(&self.mu_rs, m));
+                    compare(Axis::RollingFriction, low, high, share(&self.mu_rs, m));
                 }
             }
         }
@@ -407,17 +432,27 @@ impl FrictionMap {
     /// Root-mean-squares of [`FrictionMap::missed`], or what was told where that is larger; 0 on a grid of two by two of
     /// which nothing was told.
     pub fn error(&self) -> InterpolationError {
-        let missed = self.missed();
-        let rms = |of: &dyn Fn(&Missed) -> f64| {
-            let squares: f64 = missed.iter().map(|m| of(m).powi(2)).sum();
-            (squares / missed.len().max(1) as f64).sqrt()
-        };
+        let InterpolationError {
+            friction,
+            repose,
+            solid_fraction,
+        } = root_mean_square(&self.missed());
         let told = &self.told;
         InterpolationError {
-            friction: std::array::from_fn(|k| rms(&|m| m.friction[k]).max(told.friction[k])),
-            repose: rms(&|m| m.repose).max(told.repose),
-            solid_fraction: rms(&|m| m.solid_fraction).max(told.solid_fraction),
+            friction: std::array::from_fn(|k| friction[k].max(told.friction[k])),
+            repose: repose.max(told.repose),
+            solid_fraction: solid_fraction.max(told.solid_fraction),
         }
+    }
+
+    /// Root-mean-squares of what is missed along one axis; `None` with two values on it.
+    pub fn error_along(&self, axis: Axis) -> Option<InterpolationError> {
+        let missed: Vec<Missed> = self
+            .missed()
+            .into_iter()
+            .filter(|m| m.along == axis)
+            .collect();
+        (!missed.is_empty()).then(|| root_mean_square(&missed))
     }
 }
 

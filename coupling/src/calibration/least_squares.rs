@@ -1,6 +1,7 @@
 //! Nonlinear least squares by Levenberg and Marquardt (Marquardt 1963, scaled by the diagonal).
 
-use nalgebra::{SMatrix, SVector};
+use nalgebra::allocator::Allocator;
+use nalgebra::{Const, DefaultAllocator, Dim, OMatrix, OVector, SMatrix, SVector};
 
 /// Why a fit has no answer.
 #[derive(Clone, Debug, PartialEq, thiserror::Error)]
@@ -40,20 +41,25 @@ pub struct Solution<const N: usize> {
 }
 
 /// JᵀWJ, JᵀW(y − f) and Σ w (y − f)² at some parameters.
-pub(super) type System<const N: usize> = (SMatrix<f64, N, N>, SVector<f64, N>, f64);
+pub(super) type System<D> = (OMatrix<f64, D, D>, OVector<f64, D>, f64);
 
-/// Goes down to where the sum of squares is least; `system` gives `None` where parameters are not allowed. `None` if the start
-/// is not.
-pub(super) fn minimise<const N: usize>(
-    start: SVector<f64, N>,
-    system: impl Fn(&SVector<f64, N>) -> Option<System<N>>,
-) -> Option<(SVector<f64, N>, System<N>)> {
+/// Goes down to where the sum of squares is least; `system` gives `None` where parameters are not allowed. Ends when a step
+/// promises to lower it by less than `enough`, or is too small to be told. `None` if the start is not allowed.
+pub(super) fn minimise<D: Dim>(
+    start: OVector<f64, D>,
+    enough: f64,
+    system: impl Fn(&OVector<f64, D>) -> Option<System<D>>,
+) -> Option<(OVector<f64, D>, System<D>)>
+where
+    DefaultAllocator: Allocator<D> + Allocator<D, D>,
+{
+    let count = start.len();
     let mut p = start;
     let (mut normal, mut gradient, mut chi_square) = system(&p)?;
     let mut damping = 1e-3;
     for _ in 0..500 {
-        let mut damped = normal;
-        for i in 0..N {
+        let mut damped = normal.clone();
+        for i in 0..count {
             damped[(i, i)] += damping * normal[(i, i)].max(1e-300);
         }
         let Some(factor) = damped.cholesky() else {
@@ -64,10 +70,14 @@ pub(super) fn minimise<const N: usize>(
             continue;
         };
         let step = factor.solve(&gradient);
-        let trial = p + step;
+        // What a step promises: twice what it gives where the sum is a parabola.
+        if damping < 1.0 && gradient.dot(&step) < enough {
+            break;
+        }
+        let trial = &p + &step;
         match system(&trial) {
             Some(next) if next.2 <= chi_square => {
-                let small = (0..N).all(|i| step[i].abs() <= 1e-12 * (p[i].abs() + 1e-12));
+                let small = (0..count).all(|i| step[i].abs() <= 1e-12 * (p[i].abs() + 1e-12));
                 p = trial;
                 (normal, gradient, chi_square) = next;
                 damping = (damping * 0.1).max(1e-15);
@@ -116,7 +126,8 @@ pub fn levenberg_marquardt<const N: usize>(
             .is_finite()
             .then_some((normal, gradient, chi_square))
     };
-    let (p, (normal, _, chi_square)) = minimise(start, system).ok_or(FitError::Degenerate)?;
+    let (p, (normal, _, chi_square)) =
+        minimise::<Const<N>>(start, 0.0, system).ok_or(FitError::Degenerate)?;
     let covariance = normal.try_inverse().ok_or(FitError::Degenerate)?;
     if (0..N).any(|i| !(covariance[(i, i)] > 0.0 && covariance[(i, i)].is_finite())) {
         return Err(FitError::Degenerate);

@@ -16,7 +16,8 @@ pub mod thesis;
 pub use fluidity::{FluidityFit, FluidityFlow, FluidityLayer, Foretold, fit_fluidity};
 pub use free_form::{FreeForm, fit_free_form};
 pub use friction_map::{
-    Curve, FrictionMap, Interpolated, InterpolationError, MapCell, MapError, Missed, WithError,
+    Axis, Curve, FrictionMap, Interpolated, InterpolationError, MapCell, MapError, Missed,
+    WithError,
 };
 pub use laws::{Alternative, Law, compare_laws};
 pub use least_squares::FitError;

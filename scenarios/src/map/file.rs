@@ -85,6 +85,7 @@ impl MapFile {
             diameter: self.diameter,
             solid_fraction: found.solid_fraction.value,
             solid_fraction_error: Some(found.solid_fraction.error),
+            solid_fraction_of_i: None,
             grain_density: Some(self.grain_density),
             valid_i: Some(found.valid_i),
             table: None,

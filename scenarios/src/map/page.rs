@@ -6,7 +6,7 @@ use super::curve::HELD;
 use crate::report::page::{figure, number, page, with_error};
 use crate::report::plot::{Mark, Plot};
 use crate::run::PUBLISHED_ANGLES;
-use colluvium_coupling::calibration::{FrictionMap, mu_of_i};
+use colluvium_coupling::calibration::{Axis, FrictionMap, mu_of_i};
 use maud::{Markup, html};
 
 /// The page.
@@ -70,12 +70,14 @@ fn measured(cells: &[Cell]) -> Markup {
 
 fn missed(map: &FrictionMap) -> Markup {
     let i = map.inertial_numbers();
-    let error = map.error();
+    let axes = [Axis::Beta, Axis::RollingFriction].into_iter();
+    let along = axes.filter_map(|a| Some((name(a), map.error_along(a)?)));
+    let rows = along.chain([("all", map.error())]);
     html! {
         @if map.missed().is_empty() { p { "No grid point has neighbours on both sides: a grid this small cannot tell the error of its interpolation." } }
         div.wide { table {
             tr {
-                th { "β" } th { "μ_R" }
+                th { "β" } th { "μ_R" } th.text { "along" }
                 @for i in i { th { (format!("μ at I = {i}")) } }
                 th { "angle of repose [°]" } th { "φ" }
             }
@@ -83,19 +85,30 @@ fn missed(map: &FrictionMap) -> Markup {
                 tr {
                     td { (m.beta) }
                     td { (m.mu_r) }
+                    td.text { (name(m.along)) }
                     @for f in m.friction { td { (format!("{f:+.4}")) } }
                     td { (format!("{:+.2}", m.repose)) }
                     td { (format!("{:+.4}", m.solid_fraction)) }
                 }
             }
-            tr {
-                td { "rms" }
-                td { "" }
-                @for f in error.friction { td { (format!("{f:.4}")) } }
-                td { (format!("{:.2}", error.repose)) }
-                td { (format!("{:.4}", error.solid_fraction)) }
+            @for (which, error) in rows {
+                tr {
+                    td { "rms" }
+                    td { "" }
+                    td.text { (which) }
+                    @for f in error.friction { td { (format!("{f:.4}")) } }
+                    td { (format!("{:.2}", error.repose)) }
+                    td { (format!("{:.4}", error.solid_fraction)) }
+                }
             }
         } }
+    }
+}
+
+fn name(axis: Axis) -> &'static str {
+    match axis {
+        Axis::Beta => "β",
+        Axis::RollingFriction => "μ_R",
     }
 }
 

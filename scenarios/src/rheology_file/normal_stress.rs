@@ -6,7 +6,7 @@
 //! makes a layer faster by 1/√r: 3.8 % for r = 0.928, for u ∝ I.
 
 use super::RheologyFile;
-use colluvium_coupling::calibration::mu_of_i;
+use colluvium_coupling::calibration::{SolidFractionFit, mu_of_i};
 
 impl RheologyFile {
     /// The law of |τ|/σ_zz, with inertial numbers made with σ_zz; without `mu_zz` nothing changes.
@@ -41,6 +41,11 @@ impl RheologyFile {
         // That of |τ|/p; none of |τ|/σ_zz is kept.
         self.covariance = None;
         self.valid_i = self.valid_i.map(|range| range.map(|i| i * root));
+        self.solid_fraction_of_i = self.solid_fraction_of_i.map(|law| SolidFractionFit {
+            slope: law.slope / root,
+            slope_error: law.slope_error / root,
+            ..law
+        });
         self.table = self.table.map(|points| {
             points
                 .iter()

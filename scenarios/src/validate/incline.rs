@@ -58,7 +58,8 @@ const LAMMPS: [PeerPoint; 3] = [
     },
 ];
 
-/// Scenes and what is changed for the suite: glass on a quarter of its floor, for its campaign is four times as long.
+/// Scenes and what is changed for the suite: glass on a quarter of its floor, for its campaign is four times as long, and with
+/// thin layers besides: h_stop.
 const MATERIALS: [(&str, &[&str]); 3] = [
     ("incline-moderate", &[]),
     (
@@ -67,6 +68,7 @@ const MATERIALS: [(&str, &[&str]); 3] = [
             "grains.count=1500",
             "floor.length_diameters=10",
             "floor.width_diameters=5",
+            "calibration.depths=[0.2, 0.35]",
         ],
     ),
     ("incline-gravel", &[]),
