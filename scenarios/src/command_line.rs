@@ -105,6 +105,9 @@ enum Command {
         /// Compare with a run that has this setting, instead of an exact solution
         #[arg(long, value_name = "KEY=VALUE")]
         reference: Vec<String>,
+        /// Set a run with this setting beside the others, such as that of another model
+        #[arg(long, value_name = "KEY=VALUE")]
+        beside: Vec<String>,
         /// Directory of the table, the plot and the runs
         #[arg(long, value_name = "DIR")]
         out: Option<PathBuf>,
@@ -428,11 +431,12 @@ pub fn execute(line: CommandLine) -> Result<(), Failure> {
             scene,
             vary,
             reference,
+            beside,
             out,
             threads,
         } => {
             let loaded = scene.load()?;
-            let comparison = pareto::Comparison::new(loaded, &vary, &reference)?;
+            let comparison = pareto::Comparison::new(loaded, &vary, &reference, &beside)?;
             print(&comparison.run(out, threads.map(usize::from))?);
         }
         Command::CoarseGrain(arguments) => {

@@ -1,4 +1,5 @@
-//! Pictures of a run through time: `grains.vtkhdf`, `contacts.vtkhdf`, `bodies.vtkhdf`, `clumps.vtkhdf`, `fields.vtkhdf`.
+//! Pictures of a run through time: `grains.vtkhdf`, `contacts.vtkhdf`, `bodies.vtkhdf`, `clumps.vtkhdf`, `continuum.vtkhdf`,
+//! `fields.vtkhdf`.
 //!
 //! While a run goes on, every instant lies in a file of its own in the folder `frames`, put in place
 //! whole: a killed run or a full disk leaves all earlier ones, and a run that is resumed writes the same
@@ -19,6 +20,8 @@ pub const FOLDER: &str = "frames";
 pub const SERIES: [&str; 2] = ["grains", "contacts"];
 /// Series at the end of a run with bodies, and of one with clumps.
 pub const RIGID: [&str; 2] = ["bodies", "clumps"];
+/// Series of a continuum beside grains.
+pub const CONTINUUM: &str = "continuum";
 /// Series at the end of a run of a continuum.
 pub const FIELDS: &str = "fields";
 
@@ -32,6 +35,8 @@ pub struct Frames {
     count: u64,
     /// Which of the series [`RIGID`] it has.
     rigid: [bool; 2],
+    /// Whether it has the series [`CONTINUUM`].
+    continuum: bool,
 }
 
 impl Frames {
@@ -42,6 +47,7 @@ impl Frames {
             steps,
             count: count.min(steps),
             rigid: [false; 2],
+            continuum: false,
         }
     }
 
@@ -51,11 +57,18 @@ impl Frames {
         self
     }
 
+    /// Takes a continuum along.
+    pub fn with_continuum(mut self, continuum: bool) -> Frames {
+        self.continuum = continuum;
+        self
+    }
+
     /// The series that it has.
     fn series(&self) -> impl Iterator<Item = &'static str> {
         let rigid = RIGID.into_iter().zip(self.rigid);
         let rigid = rigid.filter_map(|(series, given)| given.then_some(series));
-        SERIES.into_iter().chain(rigid)
+        let continuum = self.continuum.then_some(CONTINUUM);
+        SERIES.into_iter().chain(rigid).chain(continuum)
     }
 
     fn step_of(&self, frame: u64) -> u64 {
@@ -73,6 +86,17 @@ impl Frames {
             .find(|&step| step > done)
     }
 
+    /// Whether a frame is due at a step.
+    pub fn is_due(&self, step: u64) -> bool {
+        let due = || step.checked_sub(1).and_then(|before| self.next(before)) == Some(step);
+        self.count > 0 && (step == 0 || due())
+    }
+
+    /// Writes what the continuum is at a step at which a frame is due.
+    pub fn take_continuum(&self, step: u64, frame: Frame) -> Result<(), Failure> {
+        put(&self.directory, CONTINUUM, step, frame)
+    }
+
     /// Writes a frame if one is due at this step; `snapshot` is room for it.
     pub fn take(
         &self,
@@ -80,8 +104,7 @@ impl Frames {
         snapshot: &mut Snapshot,
     ) -> Result<(), Failure> {
         let step = simulation.steps_done();
-        let due = step == 0 || step.checked_sub(1).and_then(|s| self.next(s)) == Some(step);
-        if self.count == 0 || !due {
+        if !self.is_due(step) {
             return Ok(());
         }
         simulation.snapshot(snapshot);
@@ -149,7 +172,7 @@ pub fn remove(directory: &Path) -> std::io::Result<()> {
         return Ok(());
     }
     let own = |name: &str| {
-        let mut all = SERIES.iter().chain(&RIGID).chain([&FIELDS]);
+        let mut all = SERIES.iter().chain(&RIGID).chain([&CONTINUUM, &FIELDS]);
         let series = all.any(|series| name.starts_with(&format!("{series}_")));
         series && (name.ends_with(".vtkhdf") || name.ends_with(".partial"))
     };

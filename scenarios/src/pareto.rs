@@ -3,7 +3,7 @@
 mod observables;
 
 use crate::calibrate;
-use crate::cost::Cost;
+use crate::cost::{Cost, processor_s};
 use crate::failure::{Failure, Resumes};
 use crate::report;
 use crate::run::{self, RunOptions};
@@ -12,7 +12,7 @@ use crate::scene::{Scene, SceneBody, SceneError};
 use crate::summary::{Quantity, Status, Summary};
 use crate::table::Table;
 use observables::{Errors, TOLD, errors};
-use std::path::PathBuf;
+use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 /// A scene, the values of one key, and what to compare with.
@@ -25,6 +25,8 @@ pub struct Comparison {
     variants: Vec<(String, Scene)>,
     /// The run that counts as right; none where the scene has an exact solution.
     reference: Option<Scene>,
+    /// A run that is set beside the others, such as that of another model.
+    beside: Option<Scene>,
 }
 
 /// One run of a comparison.
@@ -40,15 +42,30 @@ pub struct Row {
     pub order: Option<f64>,
     /// Wall time (s).
     pub wall_s: f64,
+    /// Processor time, preparation included (s).
+    pub processor_s: f64,
     /// Wall time of the reference run over this one's.
     pub speed_up: Option<f64>,
     /// Grain-steps and cell-steps.
     pub steps: u64,
 }
 
+/// All runs of a comparison.
+struct Ends {
+    rows: Vec<Row>,
+    /// Cost and processor time (s) of the reference.
+    reference: Option<(Cost, f64)>,
+    beside: Option<Row>,
+}
+
 impl Comparison {
-    /// Checks the key, each of its values and the reference.
-    pub fn new(scene: Scene, vary: &str, reference: &[String]) -> Result<Comparison, Failure> {
+    /// Checks the key, each of its values, the reference and what is set beside.
+    pub fn new(
+        scene: Scene,
+        vary: &str,
+        reference: &[String],
+        beside: &[String],
+    ) -> Result<Comparison, Failure> {
         let malformed = || {
             Failure::Input(format!(
                 "--vary {vary}: wanted KEY=A,B,C with at least two values, as in `--vary grid.cells=16,32,64`"
@@ -78,11 +95,12 @@ impl Comparison {
                 )));
             }
         }
-        let reference = if reference.is_empty() {
-            None
-        } else {
-            Some(scene.with(reference, "--reference")?)
+        let with = |sets: &[String], from: &str| match sets {
+            [] => Ok(None),
+            sets => scene.with(sets, from).map(Some),
         };
+        let reference = with(reference, "--reference")?;
+        let beside = with(beside, "--beside")?;
         if reference.is_none() && !has_exact_solution(&scene) {
             return Err(Failure::Input(format!(
                 "pareto {}: this scene has no exact solution; say what to compare with, as in `--reference {}`",
@@ -99,6 +117,7 @@ impl Comparison {
             key,
             variants,
             reference,
+            beside,
         })
     }
 
@@ -107,7 +126,8 @@ impl Comparison {
         crate::interruption::listen();
         let name = format!("{}-pareto", self.scene.name);
         let place = run_directory::place(out.as_deref(), &name);
-        for scene in self.variants.iter().map(|(_, s)| s).chain(&self.reference) {
+        let ends = self.reference.iter().chain(&self.beside);
+        for scene in self.variants.iter().map(|(_, s)| s).chain(ends) {
             run::check(scene)?;
         }
         let directory = RunDirectory::create(&place, &self.scene, "pareto")?;
@@ -127,9 +147,16 @@ impl Comparison {
 
     /// Makes the runs, writes table, summary and report.
     fn finish(&self, directory: &RunDirectory, threads: Option<usize>) -> Result<String, Failure> {
-        let (rows, reference) = self.run_all(directory, threads)?;
+        let Ends {
+            rows,
+            reference,
+            beside,
+        } = self.run_all(directory, threads)?;
         let table = self.table(&rows);
         directory.write_table(&table)?;
+        if let Some(table) = ends(reference.as_ref(), beside.as_ref()) {
+            directory.write_table(&table)?;
+        }
         let mut summary = Summary::begun(&self.scene.name, "pareto");
         summary.status = Status::Done;
         summary.cost.wall_s = rows.iter().map(|r| r.wall_s).sum();
@@ -158,18 +185,35 @@ impl Comparison {
             );
         }
         let mut end_point = String::new();
-        if let Some(cost) = &reference {
+        if let Some((cost, processor_s)) = &reference {
             let steps = cost.grain_steps + cost.cell_steps;
-            end_point = format!("\nreference: {:.4} s, {steps} steps", cost.wall_s);
+            end_point = format!(
+                "\nreference: {:.4} s, {processor_s:.2} s of processors, {steps} steps",
+                cost.wall_s
+            );
             let source = "of the run that counts as right, the end point of error against cost";
             summary.put(
                 "reference_wall_s",
                 Quantity::new(cost.wall_s, "s").from(source),
             );
             summary.put(
+                "reference_processor_s",
+                Quantity::new(*processor_s, "s").from(source),
+            );
+            summary.put(
                 "reference_steps",
                 Quantity::new(steps as f64, "1").from(source),
             );
+        }
+        if let Some(row) = &beside {
+            summary.put(
+                &format!("error at {}", row.value),
+                Quantity::new(row.error, "1").against(0.0, &self.compared_with()),
+            );
+            end_point.push_str(&format!(
+                "\n{}: error {:.4e}, {:.4} s, {:.2} s of processors, {} steps",
+                row.value, row.error, row.wall_s, row.processor_s, row.steps
+            ));
         }
         directory.write_summary(&summary)?;
         report::write(directory.path())?;
@@ -181,80 +225,91 @@ impl Comparison {
         Ok(text)
     }
 
-    fn run_all(
-        &self,
-        directory: &RunDirectory,
-        threads: Option<usize>,
-    ) -> Result<(Vec<Row>, Option<Cost>), Failure> {
-        let one = |label: &str, scene: &Scene| -> Result<PathBuf, Failure> {
+    fn run_all(&self, directory: &RunDirectory, threads: Option<usize>) -> Result<Ends, Failure> {
+        let one = |label: &str, scene: &Scene| -> Result<(PathBuf, f64), Failure> {
             directory.journal.note(&format!("run {label}"));
+            let before = processor_s();
             let out = Some(directory.path().join(label));
             let options = RunOptions {
                 out,
                 threads,
                 ..RunOptions::default()
             };
-            if self.of_campaigns() {
+            let ended = if self.of_campaigns() {
                 calibrate::calibrate(scene, &options)
             } else {
                 run::run(scene, &options)
-            }
-            .map(|ended| ended.directory)
+            };
+            Ok((ended?.directory, processor_s() - before))
         };
         let reference = match &self.reference {
-            Some(scene) => Some(one("reference", scene)?),
+            Some(scene) => {
+                let (path, seconds) = one("reference", scene)?;
+                let cost = report::read_summary(&path)?.cost;
+                Some((path, (cost, seconds)))
+            }
             None => None,
         };
-        let mut rows: Vec<Row> = Vec::new();
-        let reference_cost = match &reference {
-            Some(path) => Some(report::read_summary(path)?.cost),
-            None => None,
-        };
-        for (value, scene) in &self.variants {
-            let path = one(&folder_name(&self.key, value), scene)?;
+        let row = |label: &str, value: &str, scene: &Scene| -> Result<Row, Failure> {
+            let (path, processor_s) = one(label, scene)?;
             let summary = report::read_summary(&path)?;
             let (error, errors) = match &reference {
-                Some(reference) => {
-                    let errors = if self.of_campaigns() {
-                        observables::of_campaigns(&path, reference)?
-                    } else {
-                        errors(&self.scene, &path, reference)?
-                    };
-                    // A missing value counts as missing, not as the best.
-                    let worst = |a: f64, &(_, b): &(String, f64)| {
-                        if a.is_nan() || b.is_nan() {
-                            f64::NAN
-                        } else {
-                            a.max(b)
-                        }
-                    };
-                    let judged = errors
-                        .iter()
-                        .filter(|(name, _)| !TOLD.contains(&name.as_str()));
-                    (judged.fold(0.0, worst), errors)
-                }
+                Some((reference, _)) => self.against(&path, reference)?,
                 None => (exact_error(&summary), Errors::new()),
             };
-            let order = rows
-                .last()
-                .and_then(|before| order_between(before, value, error));
-            rows.push(Row {
-                value: value.clone(),
+            let cost = summary.cost;
+            let speed_up = reference.as_ref();
+            Ok(Row {
+                value: value.to_owned(),
                 error,
-                errors: if errors.len() > 1 {
-                    errors
-                } else {
-                    Errors::new()
+                errors: match errors.len() {
+                    0 | 1 => Errors::new(),
+                    _ => errors,
                 },
-                order,
-                wall_s: summary.cost.wall_s,
-                speed_up: reference_cost
-                    .as_ref()
-                    .map(|cost| cost.wall_s / summary.cost.wall_s),
-                steps: summary.cost.grain_steps + summary.cost.cell_steps,
-            });
+                order: None,
+                wall_s: cost.wall_s,
+                processor_s,
+                speed_up: speed_up.map(|(_, (of, _))| of.wall_s / cost.wall_s),
+                steps: cost.grain_steps + cost.cell_steps,
+            })
+        };
+        let mut rows: Vec<Row> = Vec::new();
+        for (value, scene) in &self.variants {
+            let mut new = row(&folder_name(&self.key, value), value, scene)?;
+            let before = rows.last();
+            new.order = before.and_then(|before| order_between(before, value, new.error));
+            rows.push(new);
         }
-        Ok((rows, reference_cost))
+        let beside = match &self.beside {
+            Some(scene) => Some(row("beside", "beside", scene)?),
+            None => None,
+        };
+        Ok(Ends {
+            rows,
+            reference: reference.map(|(_, cost)| cost),
+            beside,
+        })
+    }
+
+    /// Largest error of a run against another, and each.
+    fn against(&self, run: &Path, reference: &Path) -> Result<(f64, Errors), Failure> {
+        let errors = if self.of_campaigns() {
+            observables::of_campaigns(run, reference)?
+        } else {
+            errors(&self.scene, run, reference)?
+        };
+        // A missing value counts as missing, not as the best.
+        let worst = |a: f64, &(_, b): &(String, f64)| {
+            if a.is_nan() || b.is_nan() {
+                f64::NAN
+            } else {
+                a.max(b)
+            }
+        };
+        let judged = errors
+            .iter()
+            .filter(|(name, _)| !TOLD.contains(&name.as_str()));
+        Ok((judged.fold(0.0, worst), errors))
     }
 
     /// Keys of a campaign are compared by campaigns.
@@ -289,6 +344,11 @@ impl Comparison {
                 rows.iter().map(|r| r.order.unwrap_or(f64::NAN)).collect(),
             )
             .with("wall_s", "s", rows.iter().map(|r| r.wall_s).collect())
+            .with(
+                "processor_s",
+                "s",
+                rows.iter().map(|r| r.processor_s).collect(),
+            )
             .with("steps", "1", rows.iter().map(|r| r.steps as f64).collect());
         if rows.iter().any(|r| r.speed_up.is_some()) {
             let speed_up = rows.iter().map(|r| r.speed_up.unwrap_or(f64::NAN));
@@ -317,8 +377,8 @@ impl Comparison {
             .map(|(name, _)| name.as_str())
             .collect();
         let mut text = format!(
-            "{:>width$}  {:>12}  {:>8}  {:>10}  {:>8}  {:>14}",
-            self.key, "error", "order", "wall [s]", "speed-up", "steps"
+            "{:>width$}  {:>12}  {:>8}  {:>10}  {:>13}  {:>8}  {:>14}",
+            self.key, "error", "order", "wall [s]", "processor [s]", "speed-up", "steps"
         );
         for name in &names {
             text.push_str(&format!("  {name:>12}"));
@@ -334,11 +394,12 @@ impl Comparison {
                 }
             };
             text.push_str(&format!(
-                "\n{:>width$}  {:>12}  {:>8}  {:>10.4}  {:>8}  {:>14}",
+                "\n{:>width$}  {:>12}  {:>8}  {:>10.4}  {:>13.2}  {:>8}  {:>14}",
                 row.value,
                 error(row.error),
                 some(row.order),
                 row.wall_s,
+                row.processor_s,
                 some(row.speed_up),
                 row.steps
             ));
@@ -350,6 +411,24 @@ impl Comparison {
         text.push_str(&format!("\nerror: {}", self.compared_with()));
         text
     }
+}
+
+/// What stands at the ends of error against cost: the reference, whose error is 0, and a run beside, if there are any.
+fn ends(reference: Option<&(Cost, f64)>, beside: Option<&Row>) -> Option<Table> {
+    let mut rows: Vec<[f64; 4]> = Vec::new();
+    if let Some((cost, seconds)) = reference {
+        let steps = cost.grain_steps + cost.cell_steps;
+        rows.push([0.0, cost.wall_s, *seconds, steps as f64]);
+    }
+    rows.extend(beside.map(|r| [r.error, r.wall_s, r.processor_s, r.steps as f64]));
+    let column = |k: usize| rows.iter().map(|row| row[k]).collect::<Vec<f64>>();
+    (!rows.is_empty()).then(|| {
+        Table::new("ends")
+            .with("error", "1", column(0))
+            .with("wall_s", "s", column(1))
+            .with("processor_s", "s", column(2))
+            .with("steps", "1", column(3))
+    })
 }
 
 /// A bed compared at several time steps has to run for one time, not for one number of steps.
@@ -410,6 +489,7 @@ mod tests {
             errors: Errors::new(),
             order: None,
             wall_s: 1.0,
+            processor_s: 1.0,
             speed_up: None,
             steps: 1,
         };

@@ -1,10 +1,10 @@
 //! Series of a run as pictures and as an animation (`colluvium render`).
 //!
 //! Grains are balls coloured by their speed, by what they hang together with or by their clump; bodies are their
-//! surfaces; fields of a continuum are its cells coloured by speed. All pictures of a run have one frame and one scale of colours.
+//! surfaces; fields of a continuum are its cells coloured by speed, behind the grains where it goes on beside them. All pictures of a run have one frame and one scale of colours.
 
 use crate::failure::Failure;
-use crate::frames::{FIELDS, RIGID, SERIES};
+use crate::frames::{CONTINUUM, FIELDS, RIGID, SERIES};
 use crate::report;
 use crate::run::world::pictures::canvas::{Ball, Extent, Plate, paint_over};
 use crate::run::world::pictures::{BODY, PLAIN, encode, fastest, palette, speed_colour};
@@ -131,11 +131,27 @@ fn draw(directory: &Path, request: &Request) -> Result<Figure, Failure> {
     }
     let mut extent = Extent::NOTHING;
     let mut instants = Vec::with_capacity(frames.len());
-    let bodies = bodies(directory, &path, frames.len())?;
+    let bodies = beside(directory, RIGID[0], &path, frames.len())?;
+    let continuum = beside(directory, CONTINUUM, &path, frames.len())?;
+    for frame in &continuum {
+        let speeds = moving_speeds(frame).map_err(refuse)?;
+        top = top.max(fastest(speeds.into_iter()));
+    }
     for (k, frame) in frames.iter().enumerate() {
         let mut instant = instant(frame, request, top).map_err(refuse)?;
         if let Some(bodies) = bodies.get(k) {
             instant.plates.extend(surfaces(bodies, request.view));
+        }
+        if let Some(cells) = continuum.get(k) {
+            let behind = self::instant(cells, request, top).map_err(refuse)?;
+            let farthest = instant.balls.iter().map(|ball| ball.depth + ball.radius);
+            let farthest = farthest.fold(0.0, f64::max);
+            instant
+                .plates
+                .extend(behind.plates.into_iter().map(|plate| Plate {
+                    corners: plate.corners.map(|[x, y, depth]| [x, y, depth + farthest]),
+                    ..plate
+                }));
         }
         extent.reach(&instant.balls, &instant.plates);
         instants.push(instant);
@@ -244,9 +260,14 @@ fn series(directory: &Path) -> Result<(PathBuf, Vec<Frame>), Failure> {
     )))
 }
 
-/// The bodies of a run of grains with so many instants; none where there are none.
-fn bodies(directory: &Path, grains: &Path, instants: usize) -> Result<Vec<Frame>, Failure> {
-    let path = directory.join(format!("{}.vtkhdf", RIGID[0]));
+/// A series beside the grains of a run with so many instants; none where there is none.
+fn beside(
+    directory: &Path,
+    series: &str,
+    grains: &Path,
+    instants: usize,
+) -> Result<Vec<Frame>, Failure> {
+    let path = directory.join(format!("{series}.vtkhdf"));
     if !path.exists() || grains.file_stem().is_none_or(|name| name != SERIES[0]) {
         return Ok(Vec::new());
     }

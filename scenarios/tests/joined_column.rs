@@ -4,7 +4,7 @@
 
 mod command;
 
-use command::{SMALL_JOINED_COLUMN, colluvium, hash, succeed, summary, table, value};
+use command::{MOVING_EDGE, SMALL_JOINED_COLUMN, colluvium, hash, succeed, summary, table, value};
 use std::path::Path;
 
 fn arguments<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
@@ -103,14 +103,8 @@ fn a_joined_column_collapses_as_its_grains_do() {
 #[test]
 fn an_edge_that_moves_hands_grains_over_and_keeps_its_books() {
     let folder = tempfile::tempdir().unwrap();
-    let moving = [
-        "zones.moving=true",
-        "zones.edge_scaled=1.2",
-        "zones.rest_speed_scaled=0.25",
-        "zones.hold_scaled=0.1",
-    ];
     for threads in ["1", "2"] {
-        let mut run = arguments(threads, &moving);
+        let mut run = arguments(threads, MOVING_EDGE);
         run.extend(["--threads", threads]);
         succeed(folder.path(), &run);
     }

@@ -4,7 +4,7 @@
 
 mod command;
 
-use command::{SMALL_HYBRID, SMALL_JOINED_COLUMN, colluvium, hash, succeed};
+use command::{MOVING_EDGE, SMALL_HYBRID, SMALL_JOINED_COLUMN, colluvium, hash, succeed, table};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
@@ -59,8 +59,8 @@ fn unfinished(folder: &Path) -> bool {
 }
 
 /// Runs a scene whole, and in parts that are killed at random moments, in the middle of a checkpoint
-/// and in the middle of a frame; both must end in the same state, rows and frames.
-fn killed_and_whole(scene: &str, sets: &[&str], seed: u64, random_kills: u32) {
+/// and in the middle of a frame; both must end in the same state, rows and frames. Gives the folder of both.
+fn killed_and_whole(scene: &str, sets: &[&str], seed: u64, random_kills: u32) -> tempfile::TempDir {
     let folder = tempfile::tempdir().unwrap();
     let arguments = |out: &'static str, more: &[&'static str]| {
         let mut list = vec!["run", scene, "--out", out, "--checkpoint-every", "0"];
@@ -109,7 +109,7 @@ fn killed_and_whole(scene: &str, sets: &[&str], seed: u64, random_kills: u32) {
     for (whole, parts) in series {
         assert_eq!(std::fs::read(parts).unwrap(), std::fs::read(whole).unwrap());
     }
-    for name in ["grains.vtkhdf", "contacts.vtkhdf"] {
+    for name in ["grains.vtkhdf", "contacts.vtkhdf", "continuum.vtkhdf"] {
         if whole.join(name).exists() {
             assert_eq!(frames(&parts.join(name)), frames(&whole.join(name)));
         }
@@ -125,6 +125,7 @@ fn killed_and_whole(scene: &str, sets: &[&str], seed: u64, random_kills: u32) {
         listing(&whole),
         "something was left behind"
     );
+    folder
 }
 
 #[test]
@@ -158,11 +159,19 @@ fn a_killed_hybrid_goes_on_in_the_middle_of_an_exchange() {
     killed_and_whole("incline", SMALL_HYBRID, 9, 3);
 }
 
-/// Its edge moves with the grains; everything of it lives in the recipe's memory.
+/// Its edge moves with the grains, and from strip to strip; everything of it lives in the recipe's memory: labels, the
+/// continuum, strips that were put by with their contacts, the cells in its frames.
 #[test]
 fn a_killed_joined_column_goes_on_in_the_middle_of_an_exchange() {
-    let sets = [SMALL_JOINED_COLUMN, &["duration_scaled=1"]].concat();
-    killed_and_whole("column-collapse", &sets, 11, 2);
+    let sets = [
+        SMALL_JOINED_COLUMN,
+        MOVING_EDGE,
+        &["duration_scaled=2", "output.frames=4"],
+    ]
+    .concat();
+    let moves = killed_and_whole("column-collapse", &sets, 11, 3);
+    let moves = table(&moves.path().join("parts/moves.csv")).1;
+    assert!(!moves.is_empty());
 }
 
 #[test]

@@ -52,7 +52,7 @@ use colluvium_continuum::grid::Boundary;
 use colluvium_continuum::rheology::ShearLaw;
 use colluvium_dem::{Diverged, Record, SetupError, Simulation};
 use shell::{Given, Shell};
-use sighting::Sighting;
+use sighting::{Sighting, free_mass};
 use start::Start;
 
 /// Why an overlap cannot be made or go on.
@@ -171,7 +171,7 @@ impl<L: ShearLaw + Copy> Overlap<L> {
             overlap.normal_velocity = averages::normal_velocity(grains, &edge, a);
         }
         simulation.remove(|g| !g.fixed && edge.distance(&g.position) > 0.0);
-        overlap.grain_mass = simulation.free_mass();
+        overlap.grain_mass = free_mass(simulation);
         overlap.prime(overlap.exchange_time(simulation))?;
         overlap.open(simulation);
         overlap.agree(simulation);
@@ -231,7 +231,7 @@ impl<L: ShearLaw + Copy> Overlap<L> {
             made: 0,
             normal_velocity: 0.0,
             mass_beyond,
-            grain_mass: simulation.free_mass(),
+            grain_mass: free_mass(simulation),
             sighting,
         }
     }

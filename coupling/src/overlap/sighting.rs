@@ -4,7 +4,19 @@
 //! over them, of which a snapshot's velocities are one. Here grains stand in the order of their numbers, contacts in
 //! that of their grains, and velocities and spins are those that the integrator holds, half a step back.
 
-use colluvium_dem::{ContactSample, Partner, Simulation, Snapshot};
+use colluvium_dem::{ContactSample, GrainSample, Partner, Simulation, Snapshot};
+
+/// Free grains as they are held, in the order of their numbers.
+pub(super) fn free_grains(simulation: &Simulation) -> Vec<GrainSample> {
+    let mut grains: Vec<GrainSample> = simulation.held(|_| true).filter(|g| !g.fixed).collect();
+    grains.sort_unstable_by_key(|grain| grain.id);
+    grains
+}
+
+/// Their mass (kg).
+pub(super) fn free_mass(simulation: &Simulation) -> f64 {
+    free_grains(simulation).iter().map(|grain| grain.mass).sum()
+}
 
 /// A snapshot in order.
 #[derive(Clone, Debug, Default)]

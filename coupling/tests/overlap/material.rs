@@ -1,6 +1,6 @@
 //! A column that is continuum behind an edge that moves with the material, and grains in front of it.
 
-use crate::world::{DENSITY, STEP, STIFFNESS, law, steps};
+use crate::world::{DENSITY, STEP, STIFFNESS, law};
 use colluvium_continuum::column_collapse::CollapseCase;
 use colluvium_continuum::free_surface::SurfaceOptions;
 use colluvium_continuum::rheology::MuI;
@@ -13,11 +13,11 @@ use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
 const LENGTH: f64 = 20.0;
-const HEIGHT: f64 = 8.0;
+pub const HEIGHT: f64 = 8.0;
 const WIDTH: f64 = 5.0;
-const EDGE: f64 = 6.0;
+pub const EDGE: f64 = 6.0;
 
-fn setup(grains: Vec<Grain>, gate: bool) -> Setup {
+pub fn setup(grains: Vec<Grain>, gate: bool) -> Setup {
     let mut walls = vec![
         Wall::plane(Vector3::zeros(), Vector3::x()),
         Wall::plane(Vector3::zeros(), Vector3::z()),
@@ -46,7 +46,7 @@ fn domain() -> Domain {
 }
 
 /// Grains at rest between the wall and a gate, cut level.
-fn settled() -> &'static [Grain] {
+pub fn settled() -> &'static [Grain] {
     static COLUMN: OnceLock<Vec<Grain>> = OnceLock::new();
     COLUMN.get_or_init(|| {
         let radius = RadiusLaw::Uniform {
@@ -83,8 +83,19 @@ fn settled() -> &'static [Grain] {
     })
 }
 
-fn spec(
+pub fn spec(
     solid_fraction: f64,
+    uncoupled: bool,
+    place: f64,
+    travel: Option<Travel>,
+) -> MaterialEdgeSpec {
+    stiff_spec(solid_fraction, STIFFNESS, uncoupled, place, travel)
+}
+
+/// With contacts of another stiffness.
+pub fn stiff_spec(
+    solid_fraction: f64,
+    stiffness: f64,
     uncoupled: bool,
     place: f64,
     travel: Option<Travel>,
@@ -93,7 +104,7 @@ fn spec(
         diameter: 1.0,
         time: 1.0,
         density: solid_fraction * DENSITY,
-        stiffness: STIFFNESS,
+        stiffness,
     };
     let settings = OverlapSettings {
         uncoupled,
@@ -119,9 +130,20 @@ fn spec(
     }
 }
 
-struct Joined {
-    simulation: Simulation,
-    edge: MaterialEdge,
+/// Solid fraction in its middle.
+pub fn settled_fraction() -> f64 {
+    let middle = Region::Block {
+        lower: Vector3::new(2.0, 0.0, 1.0),
+        upper: Vector3::new(LENGTH - 2.0, WIDTH, HEIGHT - 1.5),
+    };
+    solid_fraction(settled(), &domain(), &middle)
+}
+
+pub struct Joined {
+    pub simulation: Simulation,
+    pub edge: MaterialEdge,
+    /// Momentum of the grains that damping gave (negative: took), along x and z.
+    pub damped: [f64; 2],
 }
 
 impl Joined {
@@ -130,20 +152,27 @@ impl Joined {
     }
 
     fn with_edge(gate: bool, uncoupled: bool, place: f64, travel: Option<Travel>) -> Self {
-        let mut simulation = Simulation::new(setup(settled().to_vec(), gate)).unwrap();
-        let middle = Region::Block {
-            lower: Vector3::new(2.0, 0.0, 1.0),
-            upper: Vector3::new(LENGTH - 2.0, WIDTH, HEIGHT - 1.5),
-        };
-        let phi = solid_fraction(settled(), &domain(), &middle);
-        let spec = spec(phi, uncoupled, place, travel);
-        let edge = MaterialEdge::cut(spec, &mut simulation).unwrap();
-        Self { simulation, edge }
+        let simulation = Simulation::new(setup(settled().to_vec(), gate)).unwrap();
+        Self::cut(
+            simulation,
+            spec(settled_fraction(), uncoupled, place, travel),
+        )
     }
 
-    fn advance(&mut self, time: f64, keep: f64) {
-        let each = MaterialEdge::steps_of_loads(&self.edge.spec().settings, STEP);
-        for _ in 0..steps(time) / each {
+    pub fn cut(mut simulation: Simulation, spec: MaterialEdgeSpec) -> Self {
+        let edge = MaterialEdge::cut(spec, &mut simulation).unwrap();
+        Self {
+            simulation,
+            edge,
+            damped: [0.0; 2],
+        }
+    }
+
+    pub fn advance(&mut self, time: f64, keep: f64) {
+        let step = self.simulation.timestep();
+        let each = MaterialEdge::steps_of_loads(&self.edge.spec().settings, step);
+        let all = (time / step).round() as u64;
+        for _ in 0..all / each {
             self.simulation.advance(each).unwrap();
             let moves = self.edge.moves().len();
             self.edge.go_on(&mut self.simulation).unwrap();
@@ -151,13 +180,18 @@ impl Joined {
                 println!("{:.3?}", self.edge.moves().last());
             }
             if keep < 1.0 && self.edge.at_exchange() {
+                let before = self.edge.grain_momentum(&mut self.simulation);
                 self.simulation.damp(keep);
+                let after = self.edge.grain_momentum(&mut self.simulation);
+                for axis in 0..2 {
+                    self.damped[axis] += after[axis] - before[axis];
+                }
             }
         }
     }
 
     /// Rms velocities of the grains and of the continuum.
-    fn speeds(&mut self) -> [f64; 2] {
+    pub fn speeds(&mut self) -> [f64; 2] {
         let grains = self.simulation.held(|_| true);
         let [twice, mass] = grains.fold([0.0; 2], |[e, m], g| {
             [e + g.mass * g.velocity.norm_squared(), m + g.mass]
@@ -300,6 +334,7 @@ fn a_journey_goes_on_from_its_numbers_and_within_its_budget() {
     let mut other = Joined {
         simulation: resumed,
         edge,
+        damped: [0.0; 2],
     };
     joined.advance(9.0, 1.0);
     other.advance(9.0, 1.0);

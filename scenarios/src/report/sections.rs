@@ -16,7 +16,7 @@ const HEIGHT: u32 = 400;
 /// All plots that the tables of a run allow.
 pub fn plots(record: &Record) -> Markup {
     html! {
-        @if let Some(table) = record.table("pareto") { (pareto(&table)) }
+        @if let Some(table) = record.table("pareto") { (pareto(&table, record.table("ends").as_ref())) }
         @if let (Some(profiles), Some(speeds)) = (record.table("profiles"), record.table("speeds")) {
             (open_chute::open_chute(&profiles, &speeds, record.table("balance").as_ref()))
         } @else if let Some(table) = record.table("profiles") {
@@ -38,10 +38,26 @@ pub fn plots(record: &Record) -> Markup {
     }
 }
 
-fn pareto(table: &Table) -> Markup {
-    let mut plot = Plot::new("wall time [s]", "relative error")
-        .with("", Mark::Line, 0, table.pairs("wall_s", "error"))
-        .with("runs", Mark::Dots, 0, table.pairs("wall_s", "error"));
+fn pareto(table: &Table, ends: Option<&Table>) -> Markup {
+    // Runs of before processor time was told have wall time alone.
+    let (cost, label) = match table.column("processor_s") {
+        [] => ("wall_s", "wall time [s]"),
+        _ => ("processor_s", "processor time [s]"),
+    };
+    let points = table.pairs(cost, "error");
+    let mut plot = Plot::new(label, "relative error")
+        .with("", Mark::Line, 0, points.clone())
+        .with("runs", Mark::Dots, 0, points.clone());
+    for (seconds, error) in ends.map(|t| t.pairs(cost, "error")).unwrap_or_default() {
+        plot = match error > 0.0 {
+            true => plot.with("beside", Mark::Dots, 1, vec![(seconds, error)]),
+            // Its error, 0, lies below the lowest of a logarithmic axis: a line at its cost.
+            false => {
+                let among = points.iter().map(|p| (seconds, p.1)).collect();
+                plot.with("reference", Mark::Line, 6, among)
+            }
+        };
+    }
     (plot.x_log, plot.y_log) = (true, true);
     // Where several observables are compared, the largest error hides the others.
     let parts = table
@@ -50,12 +66,7 @@ fn pareto(table: &Table) -> Markup {
         .filter(|c| c.name.starts_with("error_"));
     for (n, part) in parts.enumerate() {
         let label = part.name.trim_start_matches("error_").replace('_', " ");
-        plot = plot.with(
-            &label,
-            Mark::Dashes,
-            n + 2,
-            table.pairs("wall_s", &part.name),
-        );
+        plot = plot.with(&label, Mark::Dashes, n + 2, table.pairs(cost, &part.name));
     }
     let key = table.columns.first().map_or("", |c| c.name.as_str());
     let mut by_key = Plot::new(key, "relative error")

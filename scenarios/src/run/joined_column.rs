@@ -7,6 +7,7 @@
 
 mod findings;
 mod oracle;
+mod pictures;
 
 use super::column_of_grains::{BEGUN, FRONTS, PROFILE_EVERY, STILL, STILL_LOOKS};
 use super::heap::{HeapCourse, edge};
@@ -18,6 +19,7 @@ use crate::scene::world::{Materials, OutputKeys, StepKeys};
 use crate::scene::{CollapseScene, LawKeys, Scene};
 use crate::summary::Summary;
 use crate::table::Table;
+use crate::vtkhdf::Frame;
 use colluvium_continuum::column_collapse::CollapseCase;
 use colluvium_continuum::rheology::MuI;
 use colluvium_coupling::overlap::OverlapError;
@@ -171,7 +173,7 @@ impl<'a> JoinedColumn<'a> {
                 height: scene.height,
                 gravity: scene.gravity,
                 rheology: self.law(solid_fraction)?,
-                cells: scene.cells(),
+                cells: scene.joined_cells(),
                 length_scaled: scene.grid.length_scaled,
                 overhang_degrees: scene.overhang_degrees,
             },
@@ -273,13 +275,12 @@ impl<'a> JoinedColumn<'a> {
         state.append(&mut course);
     }
 
-    /// Whether both sides have come to rest.
+    /// Whether both sides together have come to rest, by the measure of a column of grains: what rests behind the edge
+    /// counts as it would there, or the same heap would have to be calmer the fewer of it are grains.
     fn rests(&self, simulation: &mut Simulation, live: &mut Live) -> bool {
-        let unit = self.scene.gravity * self.scene.grains.diameter;
-        let mass = simulation.free_mass();
-        let still = simulation.time() > BEGUN * self.scene.time_unit()
-            && simulation.energy().kinetic() < STILL * mass * unit
-            && live.edge.continuum_kinetic() < STILL * live.edge.continuum_mass() * unit;
+        let unit = live.edge.whole_mass() * self.scene.gravity * self.scene.grains.diameter;
+        let kinetic = simulation.energy().kinetic() + live.edge.continuum_kinetic();
+        let still = simulation.time() > BEGUN * self.scene.time_unit() && kinetic < STILL * unit;
         live.course.resting = if still {
             live.course.resting + 1.0
         } else {
@@ -441,6 +442,19 @@ impl Recipe for JoinedColumn<'_> {
             end(places.last()),
             self.scene.edge() + live.edge.travelled(),
         ]
+    }
+
+    fn has_continuum(&self) -> bool {
+        true
+    }
+
+    fn continuum(&self, simulation: &Simulation, state: &[f64]) -> Option<Frame> {
+        let mut guard = self.live();
+        if guard.is_none() && !state.is_empty() {
+            *guard = self.recalled(simulation, state).ok();
+        }
+        let live = guard.as_ref()?;
+        Some(pictures::cells(&live.edge, simulation.time()))
     }
 
     fn conclude(&self, ran: &mut Ran, summary: &mut Summary) -> Result<Vec<Table>, Failure> {

@@ -91,6 +91,11 @@ pub struct ColumnOverlapKeys {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
     pub shell_diameters: Option<f64>,
+    /// Width of the continuum's cells, about, in diameters; left out, that of grid.cells, or 1.5 where that is finer: a
+    /// law of many grains has no finer features, and they cost most of a run.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minimum" = 0.25, "maximum" = 100.0))]
+    pub cell_diameters: Option<f64>,
     /// Time over which stresses of grains are averaged (s).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
@@ -145,6 +150,8 @@ impl ColumnOverlapKeys {
 /// Relaxation and following times over √(d/g): with 1 of it, as on an incline, the continuum behind a heap that has
 /// come to rest goes on creeping past its grains.
 const TOGETHER: f64 = 0.2;
+/// Width of cells in diameters below which nobody says that they are to be finer.
+const CELL: f64 = 1.5;
 /// Solid fraction of a settled column, before it is there to be measured.
 pub const DENSE: f64 = 0.57;
 /// Column heights in front of the foot's end that begin to flow: a collapse fails along a plane from there, which
@@ -320,8 +327,19 @@ impl CollapseScene {
         Ok(())
     }
 
-    /// Edge of a cell of the grid (m).
+    /// Cells of the continuum beside grains along x.
+    pub fn joined_cells(&self) -> usize {
+        let length = self.grid.length_scaled * self.height;
+        let wide = |diameters: f64| length / (diameters * self.grains.diameter);
+        let cells = match self.overlap.cell_diameters {
+            Some(diameters) => wide(diameters),
+            None => wide(CELL).min(self.cells() as f64),
+        };
+        cells.round().max(8.0) as usize
+    }
+
+    /// Edge of one of them (m).
     pub fn spacing(&self) -> f64 {
-        self.grid.length_scaled * self.height / self.cells() as f64
+        self.grid.length_scaled * self.height / self.joined_cells() as f64
     }
 }

@@ -31,6 +31,14 @@ pub const SMALL_JOINED_COLUMN: &[&str] = &[
     "output.pictures=0",
 ];
 
+/// With these its edge begins far behind the front and goes out over what rests.
+pub const MOVING_EDGE: &[&str] = &[
+    "zones.moving=true",
+    "zones.edge_scaled=1.2",
+    "zones.rest_speed_scaled=0.25",
+    "zones.hold_scaled=0.1",
+];
+
 /// Runs `colluvium` in a folder.
 pub fn colluvium(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_colluvium"))

@@ -155,10 +155,12 @@ pub struct Monitors {
     pub steps: [f64; 2],
     /// Largest residual of the continuum's momentum.
     pub residual: f64,
+    /// Newton iterations of the continuum's steps, and how often one was cut and tried again.
+    pub newton: [f64; 2],
 }
 
 /// Numbers of the monitors.
-pub const MONITORED: usize = 13;
+pub const MONITORED: usize = 15;
 
 impl Monitors {
     /// All of it in a row of numbers.
@@ -177,6 +179,8 @@ impl Monitors {
             self.steps[1],
             self.residual,
             self.grain_steps,
+            self.newton[0],
+            self.newton[1],
         ]
     }
 
@@ -193,6 +197,7 @@ impl Monitors {
             steps: [n[9], n[10]],
             residual: n[11],
             grain_steps: n[12],
+            newton: [n[13], n[14]],
         }
     }
 

@@ -54,7 +54,7 @@ impl MaterialEdge {
             }
         }
         let gravity = simulation.gravity();
-        let mass = simulation.free_mass();
+        let mass = self.grain_mass;
         for axis in 0..2 {
             let relaxation: f64 = self.laid.relaxation.iter().map(|f| f[axis]).sum();
             self.given.traction[axis] += self.laid.traction[axis] * time;
@@ -242,6 +242,8 @@ impl MaterialEdge {
             let step = self.collapse.step(until)?;
             self.monitors.steps[0] += 1.0;
             self.monitors.steps[1] += step.active_cells as f64;
+            self.monitors.newton[0] += step.newton_iterations as f64;
+            self.monitors.newton[1] += step.cuts as f64;
             self.monitors.residual = self.monitors.residual.max(step.residuals.momentum);
         }
         // Velocities have moved on by this, half a step ahead of the fractions.

@@ -10,13 +10,19 @@ use super::{MaterialEdge, MaterialEdgeSpec, OverlapError, continuum};
 use colluvium_dem::{Patch, Simulation};
 
 /// Numbers in front but for the two rows of forces by cell, the account among them.
-const FRONT: usize = 11 + account::NUMBERS;
+const FRONT: usize = 12 + account::NUMBERS;
 
 impl MaterialEdge {
     /// What every load changes.
     fn front(&self) -> Vec<f64> {
         let mut front = Vec::with_capacity(FRONT + 4 * self.cells.count());
-        front.extend([self.cells.count() as f64, self.made as f64, self.kick]);
+        let cells = self.cells.count() as f64;
+        front.extend([
+            cells,
+            self.made as f64,
+            self.kick,
+            self.monitors.grain_steps,
+        ]);
         for given in [&self.laid, &self.given] {
             front.extend(given.traction);
             front.extend(given.impedance);
@@ -153,7 +159,7 @@ impl MaterialEdge {
             && handshake.len() == edge.cells.counts[1]
             && edge.cells.count() == cells;
         let (scalars, forces) = front.split_at(FRONT);
-        let Ok(account) = scalars[11..].try_into() else {
+        let Ok(account) = scalars[12..].try_into() else {
             return Ok(None);
         };
         if !fits {
@@ -167,17 +173,19 @@ impl MaterialEdge {
         edge.held.reach = reach;
         edge.owed = owed.as_chunks::<2>().0.to_vec();
         edge.monitors = Monitors::of(monitors);
+        edge.monitors.grain_steps = scalars[3];
         edge.exchanges = exchanges as u64;
         edge.made = scalars[1] as u64;
         edge.kick = scalars[2];
         for (k, given) in [&mut edge.laid, &mut edge.given].into_iter().enumerate() {
-            let n = &scalars[3 + 4 * k..];
+            let n = &scalars[4 + 4 * k..];
             given.traction = [n[0], n[1]];
             given.impedance = [n[2], n[3]];
             let own = &forces[2 * cells * k..2 * cells * (k + 1)];
             given.relaxation = own.as_chunks::<2>().0.to_vec();
         }
         edge.account = Account::of(account);
+        edge.weigh(simulation);
         edge.collapse.set_state(state)?;
         edge.view.look(&edge.collapse, &edge.cells);
         Ok(Some(edge))

@@ -36,7 +36,7 @@ pub use travel::{Move, Travel};
 
 use super::OverlapError;
 use super::settings::Resolved;
-use super::sighting::Sighting;
+use super::sighting::{Sighting, free_grains, free_mass};
 use cells::Sums;
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
 use colluvium_continuum::free_surface::{Outside, SurfaceOptions};
@@ -168,6 +168,8 @@ pub struct MaterialEdge {
     spec: MaterialEdgeSpec,
     cells: Cells,
     collapse: Collapse,
+    /// Mass of the free grains (kg).
+    grain_mass: f64,
     /// Mass of the continuum, copy included, and of what rests behind it (kg).
     continuum_mass: f64,
     rest_mass: f64,
@@ -235,6 +237,7 @@ impl MaterialEdge {
         let place = spec.place;
         simulation.remove(|g| g.position.x < if g.fixed { floor } else { place });
         edge.sighting.look(simulation);
+        edge.weigh(simulation);
         edge.account.grains_before = edge.grain_momentum(simulation);
         edge.account.continuum_before = edge.continuum_momentum();
         edge.prime()?;
@@ -265,6 +268,7 @@ impl MaterialEdge {
         Ok(Self {
             cells,
             collapse,
+            grain_mass: 0.0,
             continuum_mass: mass,
             rest_mass,
             labels: Labels {
@@ -331,7 +335,7 @@ impl MaterialEdge {
     pub fn account(&self, simulation: &Simulation) -> Account {
         let mut account = self.account;
         let gravity = simulation.gravity();
-        let weight = [gravity.x, gravity.z].map(|g| g * simulation.free_mass());
+        let weight = [gravity.x, gravity.z].map(|g| g * self.grain_mass);
         let time = self.acting(simulation);
         for axis in 0..2 {
             let relaxation: f64 = self.laid.relaxation.iter().map(|f| f[axis]).sum();
@@ -390,6 +394,20 @@ impl MaterialEdge {
         [momentum.x, momentum.z]
     }
 
+    /// Momentum of the free grains along x and z as they are held, without what walls have taken: the same bits after a
+    /// restart (N s).
+    fn held_momentum(simulation: &Simulation) -> [f64; 2] {
+        let grains = free_grains(simulation);
+        let momenta = grains.iter().map(|g| g.mass * g.velocity);
+        let sum = momenta.fold(nalgebra::Vector3::zeros(), |sum, p| sum + p);
+        [sum.x, sum.z]
+    }
+
+    /// Weighs the free grains.
+    fn weigh(&mut self, simulation: &Simulation) {
+        self.grain_mass = free_mass(simulation);
+    }
+
     /// Momentum of the continuum along x and z, copy included (N s).
     pub fn continuum_momentum(&self) -> [f64; 2] {
         let unit = self.impulse_unit();
@@ -411,6 +429,11 @@ impl MaterialEdge {
     /// Mass of the continuum, copy included (kg).
     pub fn continuum_mass(&self) -> f64 {
         self.continuum_mass
+    }
+
+    /// Mass of grains and continuum at the start, each counted on its side, and of what rests behind (kg).
+    pub fn whole_mass(&self) -> f64 {
+        self.account.mass
     }
 
     /// Mass of what rests behind the continuum (kg).

@@ -4,7 +4,8 @@
 //! contacts ([`Patch`]), and goes where the continuum goes. After an exchange the edge may make one move of that width:
 //!
 //! - *outwards*, when the grains that would become continuum, or its overlap, have rested for a time: their rms speed
-//!   was below v_rest all the while. The continuum's copy already weighs what they weigh; they are put by as a strip;
+//!   was below v_rest all the while, and the grains beyond are faster: where nothing flows any more a move spares no
+//!   steps, and shakes what rests. The continuum's copy already weighs what they weigh; they are put by as a strip;
 //! - *inwards*, when the continuum of the last strip moves faster than v_wake > v_rest: its grains are put back with
 //!   the continuum's velocity. Where one of them would lie in a grain that has come there meanwhile, it is laid on top
 //!   of the heap instead, so that no mass is lost.
@@ -49,6 +50,14 @@ pub struct Move {
     pub mass: f64,
     /// Free and fixed grains after it.
     pub grains: f64,
+}
+
+/// Rms speeds (m/s) of the grains that would be continuum or overlap after a move outwards and of those beyond, and how many
+/// the latter are.
+struct Beside {
+    speed: f64,
+    front: f64,
+    count: f64,
 }
 
 /// Numbers of a move.
@@ -158,8 +167,12 @@ impl MaterialEdge {
             self.journey.resting = 0.0;
             return self.come_back(&travel, woken, simulation);
         }
-        let (speed, beyond) = self.speed_beside(travel.width);
-        let rests = speed < travel.rest && beyond >= travel.fewest;
+        let Beside {
+            speed,
+            front,
+            count,
+        } = self.speed_beside(travel.width);
+        let rests = speed < travel.rest && front > travel.rest && count >= travel.fewest;
         self.journey.resting = if rests {
             self.journey.resting + 1.0
         } else {
@@ -210,21 +223,25 @@ impl MaterialEdge {
         }
     }
 
-    /// Rms speed of the grains that would be continuum or overlap after a move outwards (m/s), and how many lie beyond.
-    fn speed_beside(&self, width: f64) -> (f64, f64) {
+    /// Speeds beside the edge, where strips have this width (m).
+    fn speed_beside(&self, width: f64) -> Beside {
         let end = width + self.spec.zones()[1];
-        let (mut sum, mut mass, mut beyond) = (0.0, 0.0, 0.0);
+        let (mut sums, mut masses, mut count) = ([0.0; 2], [0.0; 2], 0.0);
         for grain in &self.sighting.snapshot.grains {
-            match self.labels.of(grain) {
-                Some(label) if label < end => {
-                    sum += grain.mass * grain.velocity.norm_squared();
-                    mass += grain.mass;
-                }
-                Some(_) => beyond += 1.0,
-                None => {}
-            }
+            let Some(label) = self.labels.of(grain) else {
+                continue;
+            };
+            let side = usize::from(label >= end);
+            sums[side] += grain.mass * grain.velocity.norm_squared();
+            masses[side] += grain.mass;
+            count += side as f64;
         }
-        (super::cells::over(sum, mass).sqrt(), beyond)
+        let speed = |side: usize| super::cells::over(sums[side], masses[side]).sqrt();
+        Beside {
+            speed: speed(0),
+            front: speed(1),
+            count,
+        }
     }
 
     /// Gives all grains labels anew, for an edge at these places row by row (m).
@@ -250,7 +267,7 @@ impl MaterialEdge {
         // The copy of what changes hands says all that its grains say.
         self.see_grains();
         self.copy_the_grains(f64::INFINITY)?;
-        let before = self.grain_momentum(simulation);
+        let before = Self::held_momentum(simulation);
         let patch = simulation.take_out(|g| self.strip(g, travel.width).is_some());
         let mass = -patch.mass();
         self.journey.strips.push(patch);
@@ -279,7 +296,7 @@ impl MaterialEdge {
         let there = self.sighting.snapshot.grains.iter();
         let there = there.map(|g| (g.position, g.radius)).collect();
         self.journey.displaced += make_room(&mut patch.grains, there, self.spec.slab);
-        let before = self.grain_momentum(simulation);
+        let before = Self::held_momentum(simulation);
         let mass = patch.mass();
         simulation.put_back(&patch)?;
         let mut places = self.surface_of(0.0);
@@ -296,7 +313,8 @@ impl MaterialEdge {
 
     /// Books a move, and agrees on what holds after it.
     fn handed(&mut self, [speed, mass]: [f64; 2], before: [f64; 2], simulation: &mut Simulation) {
-        let now = self.grain_momentum(simulation);
+        let now = Self::held_momentum(simulation);
+        self.weigh(simulation);
         for axis in 0..2 {
             self.account.handed[axis] += now[axis] - before[axis];
         }

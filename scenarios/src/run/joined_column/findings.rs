@@ -78,7 +78,16 @@ impl JoinedColumn<'_> {
         };
         lines.push((
             "continuum".into(),
-            format!("{law}, cells of {:.2} d", scene.spacing() / d),
+            format!(
+                "{law}, cells of {:.2} d ({})",
+                scene.spacing() / d,
+                match scene.overlap.cell_diameters {
+                    Some(_) => "overlap.cell_diameters",
+                    None if scene.joined_cells() < scene.cells() =>
+                        "computed: those of grid.cells would be finer than overlap.cell_diameters = 1.5",
+                    None => "grid.cells",
+                }
+            ),
         ));
         lines
     }
@@ -135,7 +144,7 @@ impl JoinedColumn<'_> {
             (
                 "time_of_rest",
                 Quantity::new(time, "s"),
-                "kinetic energies of both sides below 1e-4 m g d a grain; null where the run ended before",
+                "kinetic energy of both sides together below 1e-4 m g d a grain of the whole column; null where the run ended before",
             ),
             (
                 "solid_fraction",
@@ -319,6 +328,21 @@ impl JoinedColumn<'_> {
             ),
         ] {
             summary.put(name, Quantity::new(value, "1").against(right, source));
+        }
+        for (name, value, source) in [
+            ("continuum_steps", monitors.steps[0], "of the continuum"),
+            (
+                "newton_iterations",
+                monitors.newton[0],
+                "of the continuum's steps, failed attempts included",
+            ),
+            (
+                "steps_cut",
+                monitors.newton[1],
+                "of the continuum, that were halved and tried again",
+            ),
+        ] {
+            summary.put(name, Quantity::new(value, "1").from(source));
         }
         summary.put(
             "momentum_residual",

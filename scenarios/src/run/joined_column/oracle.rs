@@ -40,7 +40,7 @@ pub(super) fn survey(scene: &CollapseScene, origin: &str) -> Result<Option<Surve
     let column = JoinedColumn::new(scene, origin);
     let spec = column.spec(DENSE)?;
     let case = CollapseCase {
-        cells: (spec.case.cells / COARSER).max(FEWEST),
+        cells: (scene.cells() / COARSER).max(FEWEST),
         ..spec.case
     };
     let oracle = column.judge(case.rheology)?;

@@ -257,12 +257,23 @@ fn follow(run: Followed, under: &mut Under) -> Result<(), Failure> {
     let mut seen = Snapshot::default();
     let world = &stand.world;
     let frames = Frames::new(under.directory.path(), steps, recipe.output().frames)
-        .with_rigid(!world.bodies.is_empty(), !world.clumps.is_empty());
+        .with_rigid(!world.bodies.is_empty(), !world.clumps.is_empty())
+        .with_continuum(recipe.has_continuum());
+    // Both sides of an instant, the grains last: who looks for a frame looks for theirs.
+    let take = |simulation: &mut Simulation, seen: &mut Snapshot, state: &[f64]| {
+        let step = simulation.steps_done();
+        if frames.is_due(step)
+            && let Some(frame) = recipe.continuum(simulation, state)
+        {
+            frames.take_continuum(step, frame)?;
+        }
+        frames.take(simulation, seen)
+    };
     let mut course = Course::On;
     if simulation.steps_done() == 0 {
         course = recipe.steer(simulation, state)?;
         history.look(recipe, simulation, &mut seen, state);
-        frames.take(simulation, &mut seen)?;
+        take(simulation, &mut seen, state)?;
         if let Some(averages) = &mut averages {
             averages.take(simulation, &mut seen)?;
         }
@@ -287,7 +298,7 @@ fn follow(run: Followed, under: &mut Under) -> Result<(), Failure> {
         if next.is_multiple_of(row_every) || next == steps || course == Course::Over {
             history.look(recipe, simulation, &mut seen, state);
         }
-        frames.take(simulation, &mut seen)?;
+        take(simulation, &mut seen, state)?;
         if let Some(averages) = &mut averages {
             averages.take(simulation, &mut seen)?;
         }

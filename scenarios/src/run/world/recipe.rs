@@ -8,6 +8,7 @@ use crate::scene::LawKeys;
 use crate::scene::world::{Materials, OutputKeys, StepKeys};
 use crate::summary::Summary;
 use crate::table::Table;
+use crate::vtkhdf::Frame;
 use colluvium_dem::preparation::Packing;
 use colluvium_dem::{Simulation, Snapshot};
 use nalgebra::Vector3;
@@ -118,6 +119,16 @@ pub trait Recipe: Debug + Sync {
     /// What hangs together at the end, for a picture: for each grain in the order of numbers the rank of
     /// its group by mass, none for single grains. None where no picture of it is wanted.
     fn groups(&self, _simulation: &mut Simulation, _state: &[f64]) -> Option<Vec<Option<usize>>> {
+        None
+    }
+
+    /// Whether a continuum goes on beside the grains.
+    fn has_continuum(&self) -> bool {
+        false
+    }
+
+    /// Its cells at an instant, for pictures; none where it is not begun.
+    fn continuum(&self, _simulation: &Simulation, _state: &[f64]) -> Option<Frame> {
         None
     }
 
