@@ -120,12 +120,6 @@ const PRESSURE_REGULARISATION: f64 = 1e-5;
 /// The same for factors that are kept in double precision.
 const SMALL_REGULARISATION: f64 = 1e-8;
 
-/// Cells from which on multigrid is cheaper than factors, in space. CPU time of a step with factors and with
-/// multigrid, per active cell and Newton iteration: 34 and 36 µs (440 cells), 40 and 38 (1050), 62 and 48 (2100), 148 and
-/// 75 (8400); solved to 1e-9 44 and 43, 66 and 57, 111 and 58. In a plane factors are cheaper on every grid that was
-/// tried: 5.8 and 11.9 µs on 256 cells.
-const MULTIGRID_FROM: usize = 1000;
-
 /// Flows along one axis have narrow bands and are solved directly.
 fn method_for<const D: usize, const C: usize, const V: usize>(
     discretisation: &Discretisation<D, C, V>,
@@ -134,8 +128,7 @@ fn method_for<const D: usize, const C: usize, const V: usize>(
 ) -> Method {
     let grid = discretisation.grid();
     let axes = grid.axes().iter().filter(|axis| **axis != Axis::Flat);
-    let axes = axes.count();
-    if axes <= 1 {
+    if axes.count() <= 1 {
         return Method::Direct;
     }
     let share = if tolerance < LOOSE {
@@ -149,10 +142,7 @@ fn method_for<const D: usize, const C: usize, const V: usize>(
         tolerance,
     };
     match solver {
-        LinearSolver::Automatic if axes > 2 && discretisation.cells() >= MULTIGRID_FROM => {
-            Method::Multigrid(krylov)
-        }
         LinearSolver::Multigrid => Method::Multigrid(krylov),
-        LinearSolver::Automatic | LinearSolver::Factors => Method::Preconditioned(krylov),
+        LinearSolver::Factors => Method::Preconditioned(krylov),
     }
 }
