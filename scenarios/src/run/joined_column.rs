@@ -11,12 +11,12 @@ mod pictures;
 
 use super::column_of_grains::{BEGUN, FRONTS, PROFILE_EVERY, STILL, STILL_LOOKS};
 use super::heap::{HeapCourse, edge};
-use super::world::{Course, Expected, Ran, Recipe, Workshop, World};
+use super::world::{Course, Expected, Ran, Recipe, as_the_scene};
 use super::{Findings, Under};
 use crate::failure::Failure;
 use crate::rheology_file::RheologyFile;
-use crate::scene::world::{Materials, OutputKeys, StepKeys};
-use crate::scene::{CollapseScene, LawKeys, Scene};
+use crate::scene::world::Materials;
+use crate::scene::{CollapseScene, Scene};
 use crate::summary::Summary;
 use crate::table::Table;
 use crate::vtkhdf::Frame;
@@ -25,7 +25,7 @@ use colluvium_continuum::rheology::MuI;
 use colluvium_coupling::overlap::OverlapError;
 use colluvium_coupling::overlap::material_edge::{MaterialEdge, MaterialEdgeSpec};
 use colluvium_coupling::zones::Oracle;
-use colluvium_dem::preparation::{Packing, solid_fraction};
+use colluvium_dem::preparation::solid_fraction;
 use colluvium_dem::{Simulation, Snapshot};
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -303,50 +303,7 @@ impl Recipe for JoinedColumn<'_> {
         )
     }
 
-    fn materials(&self, origin: &str) -> Result<Materials, Failure> {
-        self.scene.materials(origin)
-    }
-
-    fn contact(&self) -> &LawKeys {
-        self.scene.contact()
-    }
-
-    fn seed(&self) -> u64 {
-        self.scene.seed()
-    }
-
-    fn coarse_graining(&self) -> f64 {
-        1.0
-    }
-
-    fn step(&self) -> &StepKeys {
-        self.scene.step()
-    }
-
-    fn output(&self) -> &OutputKeys {
-        self.scene.output()
-    }
-
-    fn packing(&self) -> Option<&str> {
-        self.scene.packing()
-    }
-
-    fn provenance(&self) -> Option<toml::Table> {
-        self.scene.provenance()
-    }
-
-    fn prepare(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure> {
-        self.scene.prepare(shop, origin)
-    }
-
-    fn world(
-        &self,
-        packing: &Packing,
-        materials: &Materials,
-        origin: &str,
-    ) -> Result<World, Failure> {
-        self.scene.world(packing, materials, origin)
-    }
+    as_the_scene!();
 
     fn expected(&self, materials: &Materials) -> Expected {
         let all = self.scene.expected(materials);
@@ -459,9 +416,5 @@ impl Recipe for JoinedColumn<'_> {
 
     fn conclude(&self, ran: &mut Ran, summary: &mut Summary) -> Result<Vec<Table>, Failure> {
         self.find(ran, summary)
-    }
-
-    fn compared(&self) -> Vec<&'static str> {
-        self.scene.compared()
     }
 }

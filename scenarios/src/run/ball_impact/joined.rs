@@ -3,11 +3,11 @@
 //! The whole bed is settled as grains, the same as with `model = "dem"`; at the start what lies beyond the box becomes
 //! continuum (`coupling::overlap::bowl`). Preparation, walls, ball and step are those of the bed of grains.
 
-use super::super::world::{Course, Expected, Ran, Recipe, Workshop, World};
+use super::super::world::{Course, Expected, Ran, Recipe, as_the_scene};
 use crate::failure::Failure;
 use crate::rheology_file::RheologyFile;
-use crate::scene::world::{Materials, OutputKeys, StepKeys};
-use crate::scene::{BallImpactScene, LawKeys};
+use crate::scene::BallImpactScene;
+use crate::scene::world::Materials;
 use crate::state_hash;
 use crate::summary::{Quantity, Summary};
 use crate::table::Table;
@@ -15,7 +15,7 @@ use colluvium_continuum::free_surface::SurfaceOptions;
 use colluvium_continuum::rheology::MuI;
 use colluvium_coupling::overlap::OverlapError;
 use colluvium_coupling::overlap::bowl::{Bowl, BowlSpec};
-use colluvium_dem::preparation::{Packing, solid_fraction};
+use colluvium_dem::preparation::solid_fraction;
 use colluvium_dem::{Simulation, Snapshot};
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -159,50 +159,7 @@ impl Recipe for JoinedBed<'_> {
         )
     }
 
-    fn materials(&self, origin: &str) -> Result<Materials, Failure> {
-        Recipe::materials(self.scene, origin)
-    }
-
-    fn contact(&self) -> &LawKeys {
-        self.scene.contact()
-    }
-
-    fn seed(&self) -> u64 {
-        self.scene.seed()
-    }
-
-    fn coarse_graining(&self) -> f64 {
-        self.scene.coarse_graining()
-    }
-
-    fn step(&self) -> &StepKeys {
-        self.scene.step()
-    }
-
-    fn output(&self) -> &OutputKeys {
-        self.scene.output()
-    }
-
-    fn packing(&self) -> Option<&str> {
-        self.scene.packing()
-    }
-
-    fn provenance(&self) -> Option<toml::Table> {
-        self.scene.provenance()
-    }
-
-    fn prepare(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure> {
-        self.scene.prepare(shop, origin)
-    }
-
-    fn world(
-        &self,
-        packing: &Packing,
-        materials: &Materials,
-        origin: &str,
-    ) -> Result<World, Failure> {
-        self.scene.world(packing, materials, origin)
-    }
+    as_the_scene!();
 
     fn expected(&self, materials: &Materials) -> Expected {
         let all = self.scene.expected(materials);
@@ -344,10 +301,6 @@ impl Recipe for JoinedBed<'_> {
         );
         tables.push(cells(&bowl));
         Ok(tables)
-    }
-
-    fn compared(&self) -> Vec<&'static str> {
-        self.scene.compared()
     }
 }
 

@@ -104,8 +104,10 @@ fn packing(
         })?;
         return Ok((stored, true));
     }
-    if let Some(stored) = store::find(recipe, materials, &under.scene.origin)? {
+    if let Some(mut stored) = store::find(recipe, materials, &under.scene.origin)? {
         under.begin()?;
+        // The run that made it has paid for it.
+        stored.grain_steps = 0;
         under.directory.journal.note("starts from a stored packing");
         packing_file::write(&own, &under.scene.name, &stored)?;
         return Ok((stored, false));

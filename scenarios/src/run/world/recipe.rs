@@ -138,3 +138,65 @@ pub trait Recipe: Debug + Sync {
     /// Results that runs are compared by (`pareto`).
     fn compared(&self) -> Vec<&'static str>;
 }
+
+/// What a recipe in a field `scene` says, said by the one that wraps it: all that is not joined to a continuum.
+macro_rules! as_the_scene {
+    () => {
+        fn materials(
+            &self,
+            origin: &str,
+        ) -> Result<$crate::scene::world::Materials, $crate::failure::Failure> {
+            $crate::run::world::Recipe::materials(self.scene, origin)
+        }
+
+        fn contact(&self) -> &$crate::scene::LawKeys {
+            self.scene.contact()
+        }
+
+        fn seed(&self) -> u64 {
+            $crate::run::world::Recipe::seed(self.scene)
+        }
+
+        fn coarse_graining(&self) -> f64 {
+            self.scene.coarse_graining()
+        }
+
+        fn step(&self) -> &$crate::scene::world::StepKeys {
+            self.scene.step()
+        }
+
+        fn output(&self) -> &$crate::scene::world::OutputKeys {
+            self.scene.output()
+        }
+
+        fn packing(&self) -> Option<&str> {
+            self.scene.packing()
+        }
+
+        fn provenance(&self) -> Option<toml::Table> {
+            self.scene.provenance()
+        }
+
+        fn prepare(
+            &self,
+            shop: &mut $crate::run::world::Workshop,
+            origin: &str,
+        ) -> Result<(), $crate::failure::Failure> {
+            self.scene.prepare(shop, origin)
+        }
+
+        fn world(
+            &self,
+            packing: &colluvium_dem::preparation::Packing,
+            materials: &$crate::scene::world::Materials,
+            origin: &str,
+        ) -> Result<$crate::run::world::World, $crate::failure::Failure> {
+            self.scene.world(packing, materials, origin)
+        }
+
+        fn compared(&self) -> Vec<&'static str> {
+            self.scene.compared()
+        }
+    };
+}
+pub(crate) use as_the_scene;
