@@ -66,7 +66,7 @@ fn a_ball_sinks_into_a_joined_bed_as_into_grains() {
     let at = |name: &str| folder.path().join(name);
     succeed(folder.path(), &arguments("grains", &[]));
     for (name, threads) in [("joined", "1"), ("two", "2")] {
-        let mut run = joined(name, &[]);
+        let mut run = joined(name, &["output.frames=3"]);
         run.extend(["--threads", threads]);
         succeed(folder.path(), &run);
     }
@@ -75,6 +75,9 @@ fn a_ball_sinks_into_a_joined_bed_as_into_grains() {
         folder.path(),
         &joined("control", &["overlap.uncoupled=true"]),
     );
+    let series = hdf5::File::open(at("joined/continuum.vtkhdf")).unwrap();
+    let times = series.dataset("VTKHDF/Steps/Values").unwrap();
+    assert!(times.read_raw::<f64>().unwrap().len() >= 3);
     let [grains, joint, control] = ["grains", "joined", "control"].map(|name| summary(&at(name)));
     for name in [
         "penetration",
@@ -110,27 +113,34 @@ fn a_ball_sinks_into_a_joined_bed_as_into_grains() {
     assert!(value(&joint, "grain_steps_share") < 0.4);
 }
 
-/// Killed on the way, it goes on to the same bits.
+/// Killed twice on the way, it goes on to the same bits.
 #[test]
 fn a_joined_bed_goes_on_after_a_kill() {
     let folder = tempfile::tempdir().unwrap();
-    let short = ["duration=0.012"];
-    succeed(folder.path(), &joined("whole", &short));
-    let mut killed = joined("killed", &short);
+    succeed(folder.path(), &joined("whole", &[]));
+    let mut killed = joined("killed", &[]);
     killed.extend(["--checkpoint-every", "0"]);
-    let mut child = Command::new(env!("CARGO_BIN_EXE_colluvium"))
-        .args(&killed)
-        .current_dir(folder.path())
-        .stdout(Stdio::null())
-        .spawn()
-        .unwrap();
     let checkpoint = folder.path().join("killed/checkpoint.h5");
-    while !checkpoint.exists() && child.try_wait().unwrap().is_none() {}
-    child.kill().unwrap();
-    child.wait().unwrap();
-    assert!(checkpoint.exists(), "it was done before it was killed");
-    killed.push("--resume");
-    succeed(folder.path(), &killed);
+    for _ in 0..2 {
+        let mut child = Command::new(env!("CARGO_BIN_EXE_colluvium"))
+            .args(&killed)
+            .current_dir(folder.path())
+            .stdout(Stdio::null())
+            .spawn()
+            .unwrap();
+        while !checkpoint.exists() && child.try_wait().unwrap().is_none() {}
+        std::thread::sleep(std::time::Duration::from_millis(200));
+        child.kill().unwrap();
+        child.wait().unwrap();
+        let done = folder.path().join("killed/report.html").exists();
+        assert!(!done, "it was done before it was killed");
+        if killed.last() != Some(&"--resume") {
+            killed.push("--resume");
+        }
+    }
+    let mut last = joined("killed", &[]);
+    last.push("--resume");
+    succeed(folder.path(), &last);
     let [whole, resumed] = ["whole", "killed"].map(|name| hash(&folder.path().join(name)));
     assert_eq!(whole, resumed);
 }
@@ -174,6 +184,12 @@ fn bad_joined_beds_are_refused_by_key() {
             "at most the time",
         ),
         (&["zones.edge_scaled=1"], "zones.edge_scaled", "zones"),
+        // The overlap has room, but no whole cell above it.
+        (
+            &["zones.depth=0.0085"],
+            "zones.depth",
+            "a cell of grains is left",
+        ),
     ] {
         let refused = colluvium(folder.path(), &joined("x", sets));
         let message = String::from_utf8_lossy(&refused.stderr).into_owned();

@@ -1,18 +1,18 @@
 //! The collapse of a cylinder in space: from the scene to front and deposit.
 
 use super::collapse::options_of;
-use super::surface_fields::SurfaceFields;
+use super::surface_fields::space_frame;
 use super::surface_run::{self, Course, Followed};
 use super::{Findings, Under};
 use crate::failure::Failure;
 use crate::scene::{CylinderScene, Scene};
 use crate::summary::{Quantity, Summary};
 use crate::table::Table;
-use crate::vtkhdf::{Cells, Frame};
+use crate::vtkhdf::Frame;
 use colluvium_continuum::Error;
 use colluvium_continuum::cylinder_collapse::{CylinderCase, CylinderCollapse};
-use colluvium_continuum::free_surface::{SpaceFields, SpaceState, SurfaceStep};
-use colluvium_continuum::strain::{SPACE_COMPONENTS, deviator};
+use colluvium_continuum::free_surface::{SpaceState, SurfaceStep};
+use colluvium_continuum::strain::SPACE_COMPONENTS;
 use colluvium_continuum::units::Units;
 
 /// What the continuum leaves out.
@@ -122,37 +122,9 @@ pub(super) fn run(scene: &CylinderScene, under: &mut Under) -> Result<Findings, 
     })
 }
 
-/// The cells with material as hexahedra, with the fields over them. The deviatoric stress, positive in tension,
-/// has τ_zz = −τ_xx − τ_yy.
+/// The cells with material as hexahedra, with the fields over them.
 pub fn frame(collapse: &CylinderCollapse) -> Frame {
-    let cells = collapse.fields();
-    let law = collapse.rheology();
-    let fields = SurfaceFields {
-        cells: &cells,
-        inertia: law.diameter * law.grain_density.sqrt(),
-        others: 0,
-    };
-    let stresses = vec![
-        fields.scalars("deviatoric_stress_xx", "Pa", &|c| deviator(c.stress)[0]),
-        fields.scalars("deviatoric_stress_yy", "Pa", &|c| deviator(c.stress)[1]),
-        fields.scalars("shear_stress_xy", "Pa", &|c| c.stress[2]),
-        fields.scalars("shear_stress_xz", "Pa", &|c| c.stress[3]),
-        fields.scalars("shear_stress_yz", "Pa", &|c| c.stress[4]),
-    ];
-    Frame {
-        time: collapse.time(),
-        cells: Cells::Hexahedra,
-        points: cells.iter().flat_map(corners).collect(),
-        fields: fields.all(|velocity| velocity, stresses),
-    }
-}
-
-/// Corners of a cell: round its base, then round its top.
-fn corners(cell: &SpaceFields) -> [[f64; 3]; 8] {
-    let ([x0, y0, z0], [x1, y1, z1]) = (cell.lower, cell.upper);
-    let round = |z: f64| [[x0, y0, z], [x1, y0, z], [x1, y1, z], [x0, y1, z]];
-    let ([a, b, c, d], [e, f, g, h]) = (round(z0), round(z1));
-    [a, b, c, d, e, f, g, h]
+    space_frame(&collapse.fields(), collapse.rheology(), collapse.time())
 }
 
 fn tables(collapse: &CylinderCollapse, course: &Course) -> Vec<Table> {

@@ -1,9 +1,10 @@
 //! Fields over the cells of a flow with a moving surface, for pictures.
 
-use crate::vtkhdf::{Field, Values};
+use crate::vtkhdf::{Cells, Field, Frame, Values};
 use colluvium_continuum::discretisation::COMPONENTS;
-use colluvium_continuum::free_surface::CellFields;
-use colluvium_continuum::rheology::strain_rate_norm;
+use colluvium_continuum::free_surface::{CellFields, SpaceFields};
+use colluvium_continuum::rheology::{MuI, strain_rate_norm};
+use colluvium_continuum::strain::deviator;
 
 /// A field of that name and unit.
 pub(super) fn field(name: &str, unit: &str, values: Values) -> Field {
@@ -81,4 +82,35 @@ impl SurfaceFields<'_, 2, COMPONENTS> {
         ];
         self.all(|[u, w]| [u, 0.0, w], stresses)
     }
+}
+
+/// Cells of a flow in space as hexahedra, with the fields over them. The deviatoric stress, positive in tension, has
+/// τ_zz = −τ_xx − τ_yy.
+pub(super) fn space_frame(cells: &[SpaceFields], law: &MuI, time: f64) -> Frame {
+    let fields = SurfaceFields {
+        cells,
+        inertia: law.diameter * law.grain_density.sqrt(),
+        others: 0,
+    };
+    let stresses = vec![
+        fields.scalars("deviatoric_stress_xx", "Pa", &|c| deviator(c.stress)[0]),
+        fields.scalars("deviatoric_stress_yy", "Pa", &|c| deviator(c.stress)[1]),
+        fields.scalars("shear_stress_xy", "Pa", &|c| c.stress[2]),
+        fields.scalars("shear_stress_xz", "Pa", &|c| c.stress[3]),
+        fields.scalars("shear_stress_yz", "Pa", &|c| c.stress[4]),
+    ];
+    Frame {
+        time,
+        cells: Cells::Hexahedra,
+        points: cells.iter().flat_map(corners).collect(),
+        fields: fields.all(|velocity| velocity, stresses),
+    }
+}
+
+/// Corners of a cell: round its base, then round its top.
+fn corners(cell: &SpaceFields) -> [[f64; 3]; 8] {
+    let ([x0, y0, z0], [x1, y1, z1]) = (cell.lower, cell.upper);
+    let round = |z: f64| [[x0, y0, z], [x1, y0, z], [x1, y1, z], [x0, y1, z]];
+    let ([a, b, c, d], [e, f, g, h]) = (round(z0), round(z1));
+    [a, b, c, d, e, f, g, h]
 }

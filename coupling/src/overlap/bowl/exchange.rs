@@ -60,7 +60,7 @@ impl Bowl {
         self.given.impedance += self.laid.impedance * time;
         let relaxation: Vector3<f64> = self.laid.relaxation.iter().sum();
         self.account.relaxation += relaxation * time;
-        self.account.weight += simulation.gravity() * simulation.free_mass() * time;
+        self.account.weight += simulation.gravity() * self.grain_mass * time;
     }
 
     /// q of a grain for a side: its mass, less the farther it lies inside, down to none at the shell's end.

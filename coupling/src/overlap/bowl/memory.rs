@@ -5,11 +5,12 @@
 
 use super::account::{self, Account, Monitors};
 use super::{Bowl, BowlSpec, OverlapError, continuum};
+use crate::overlap::sighting::free_mass;
 use colluvium_dem::Simulation;
 use nalgebra::{Matrix3, Vector3};
 
 /// Numbers in front but for the two rows of forces by cell, the account among them.
-const FRONT: usize = 3 + 12 + account::NUMBERS;
+const FRONT: usize = 4 + 12 + account::NUMBERS;
 
 /// Vectors one behind the other.
 fn flat(rows: &[Vector3<f64>]) -> impl Iterator<Item = f64> {
@@ -26,7 +27,12 @@ impl Bowl {
     fn front(&self) -> Vec<f64> {
         let cells = self.layout.cells.count();
         let mut front = Vec::with_capacity(FRONT + 6 * cells);
-        front.extend([cells as f64, self.made as f64, self.kick]);
+        front.extend([
+            cells as f64,
+            self.made as f64,
+            self.kick,
+            self.monitors.grain_steps,
+        ]);
         for given in [&self.laid, &self.given] {
             front.extend(flat(&[given.traction, given.impedance]));
         }
@@ -133,12 +139,13 @@ impl Bowl {
             && velocity.len() == 3 * faces
             && area.len() == faces;
         let (scalars, forces) = front.split_at(FRONT);
-        let Ok(account) = scalars[15..].try_into() else {
+        let Ok(account) = scalars[16..].try_into() else {
             return Ok(None);
         };
         if !fits {
             return Ok(None);
         }
+        bowl.grain_mass = free_mass(simulation);
         bowl.columns = columns.to_vec();
         bowl.moved = moved.to_vec();
         let stresses = stress.as_chunks::<6>().0.iter();
@@ -151,11 +158,12 @@ impl Bowl {
         bowl.held.area = area.to_vec();
         bowl.owed = vectors(owed);
         bowl.monitors = Monitors::of(monitors);
+        bowl.monitors.grain_steps = scalars[3];
         bowl.exchanges = exchanges as u64;
         bowl.made = scalars[1] as u64;
         bowl.kick = scalars[2];
         for (k, given) in [&mut bowl.laid, &mut bowl.given].into_iter().enumerate() {
-            let pair = vectors(&scalars[3 + 6 * k..9 + 6 * k]);
+            let pair = vectors(&scalars[4 + 6 * k..10 + 6 * k]);
             (given.traction, given.impedance) = (pair[0], pair[1]);
             given.relaxation = vectors(&forces[3 * cells * k..3 * cells * (k + 1)]);
         }

@@ -32,7 +32,7 @@ pub use zone::Zone;
 
 use super::OverlapError;
 use super::settings::{Resolved, check};
-use super::sighting::Sighting;
+use super::sighting::{Sighting, free_mass};
 use cells::Sums;
 use colluvium_continuum::free_surface::{Outside, SpaceFields, SpaceFlow, SurfaceOptions};
 use colluvium_continuum::rheology::MuI;
@@ -105,6 +105,14 @@ impl BowlSpec {
         [buffer, buffer + inner]
     }
 
+    /// Whether a box, its overlap and some continuum around it have room in a bed of this height (m).
+    ///
+    /// # Errors
+    /// [`OverlapError::OutOfRange`] with `half_width` or `bottom`.
+    pub fn check(&self, height: f64) -> Result<(), OverlapError> {
+        self.layout(height).map(drop)
+    }
+
     /// The grid of a bed of this height, and the box in it.
     fn layout(&self, height: f64) -> Result<Layout, OverlapError> {
         let cell = self.settings.cell;
@@ -134,8 +142,8 @@ impl BowlSpec {
             all as f64 - margins[0] as f64 - margins[1] as f64 - sides * widths[1]
         };
         for (key, value, left) in [
-            ("half_width along x", self.half[0], inside(x, [mx, mx])),
-            ("half_width along y", self.half[1], inside(y, [my, my])),
+            ("half_width", self.half[0], inside(x, [mx, mx])),
+            ("half_width", self.half[1], inside(y, [my, my])),
             ("bottom", self.bottom, inside(filled, [mz, 0])),
         ] {
             let allowed = "such that a cell of grains is left beyond the overlap";
@@ -237,7 +245,9 @@ pub struct Bowl {
     /// Faces of the handshake surface.
     handshake: Faces,
     flow: SpaceFlow<MuI>,
-    /// Its volume at the start, in its own unit.
+    /// Mass of the free grains, ball included (kg).
+    grain_mass: f64,
+    /// Volume of the continuum at the start, in its own unit.
     start_volume: f64,
     /// Mass of grains over each column of cells at the start (kg).
     columns: Vec<f64>,
@@ -291,6 +301,7 @@ impl Bowl {
         bowl.sighting.look(simulation);
         bowl.see_grains();
         bowl.columns = bowl.column_masses();
+        bowl.grain_mass = free_mass(simulation);
         bowl.account.grains_before = bowl.grain_momentum(simulation);
         bowl.prime()?;
         bowl.agree();
@@ -333,6 +344,7 @@ impl Bowl {
         };
         Ok(Self {
             units,
+            grain_mass: 0.0,
             start_volume: flow.volume(),
             flow,
             columns: Vec::new(),
@@ -419,7 +431,7 @@ impl Bowl {
         account.traction += self.given.traction + self.laid.traction * time;
         account.impedance += self.given.impedance + self.laid.impedance * time;
         account.relaxation += relaxation * time;
-        account.weight += simulation.gravity() * simulation.free_mass() * time;
+        account.weight += simulation.gravity() * self.grain_mass * time;
         account
     }
 

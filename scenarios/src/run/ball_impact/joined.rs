@@ -3,14 +3,16 @@
 //! The whole bed is settled as grains, the same as with `model = "dem"`; at the start what lies beyond the box becomes
 //! continuum (`coupling::overlap::bowl`). Preparation, walls, ball and step are those of the bed of grains.
 
+use super::super::surface_fields::space_frame;
 use super::super::world::{Course, Expected, Ran, Recipe, as_the_scene};
 use crate::failure::Failure;
 use crate::rheology_file::RheologyFile;
-use crate::scene::BallImpactScene;
 use crate::scene::world::Materials;
+use crate::scene::{BallImpactScene, DENSE};
 use crate::state_hash;
 use crate::summary::{Quantity, Summary};
 use crate::table::Table;
+use crate::vtkhdf::Frame;
 use colluvium_continuum::free_surface::SurfaceOptions;
 use colluvium_continuum::rheology::MuI;
 use colluvium_coupling::overlap::OverlapError;
@@ -39,13 +41,28 @@ impl std::fmt::Debug for JoinedBed<'_> {
     }
 }
 
-/// What an error of the coupling means for the process.
-fn failure(error: OverlapError) -> Failure {
-    match error {
-        OverlapError::OutOfRange { .. } | OverlapError::Record(_) => {
-            Failure::Input(error.to_string())
+impl JoinedBed<'_> {
+    /// What an error of the coupling means for the process, in the scene's own keys.
+    fn failure(&self, error: OverlapError) -> Failure {
+        match error {
+            OverlapError::OutOfRange {
+                key,
+                value,
+                allowed,
+            } => {
+                let scale = self.scene.scale;
+                let floor = self.scene.container.floor;
+                let (key, value) = match key {
+                    "half_width" => ("zones.half_width", value / scale),
+                    "bottom" => ("zones.depth, whose bottom lies at z", floor + value / scale),
+                    _ => (key, value),
+                };
+                let origin = &self.origin;
+                Failure::Input(format!("{origin}: key {key} = {value}: must be {allowed}"))
+            }
+            OverlapError::Record(why) => Failure::Input(why),
+            error => Failure::Run(error.to_string()),
         }
-        error => Failure::Run(error.to_string()),
     }
 }
 
@@ -108,7 +125,7 @@ impl<'a> JoinedBed<'a> {
         let damaged = || Failure::Input("--resume: the checkpoint is damaged: recipe/state".into());
         let (head, rest) = memory.split_first_chunk::<HEAD>().ok_or_else(damaged)?;
         let spec = self.spec(*head, last(simulation))?;
-        Bowl::read(spec, rest, simulation).map_err(failure)
+        Bowl::read(spec, rest, simulation).map_err(|why| self.failure(why))
     }
 
     /// Cuts the bed.
@@ -119,7 +136,8 @@ impl<'a> JoinedBed<'a> {
         bed.pop();
         let solid = solid_fraction(&bed, simulation.domain(), &self.scene.middle(&bed));
         let head = [solid, self.scene.surface(&bed)];
-        let bowl = Bowl::cut(self.spec(head, ball)?, simulation).map_err(failure)?;
+        let bowl =
+            Bowl::cut(self.spec(head, ball)?, simulation).map_err(|why| self.failure(why))?;
         Ok((head, bowl))
     }
 
@@ -128,6 +146,13 @@ impl<'a> JoinedBed<'a> {
         memory.extend(head);
         bowl.write(&mut memory);
         *state = memory;
+    }
+
+    /// Height of the bed (m), before it is there to be measured.
+    fn expected_height(&self, diameter: f64) -> f64 {
+        let scene = self.scene;
+        let volume = scene.count() as f64 * std::f64::consts::PI / 6.0 * diameter.powi(3);
+        volume / (DENSE * scene.area())
     }
 
     /// Share of the bed's volume that stays grains.
@@ -140,9 +165,7 @@ impl<'a> JoinedBed<'a> {
         let half = scene.half_width(d);
         let edges = [scene.container.length, scene.container.width].map(|e| 0.5 * scene.scale * e);
         let across: f64 = edges.iter().map(|edge| (half / edge).min(1.0)).product();
-        let volume = scene.count() as f64 * std::f64::consts::PI / 6.0 * d.powi(3);
-        let depth = volume / crate::scene::DENSE / (4.0 * edges[0] * edges[1]);
-        across * (scene.zone_depth(d) / depth).min(1.0)
+        across * (scene.zone_depth(d) / self.expected_height(d)).min(1.0)
     }
 }
 
@@ -160,6 +183,13 @@ impl Recipe for JoinedBed<'_> {
     }
 
     as_the_scene!();
+
+    fn check(&self) -> Result<(), Failure> {
+        let materials = self.scene.materials(&self.origin)?;
+        let height = self.expected_height(self.scene.grain_diameter(&materials));
+        let spec = self.spec([DENSE, self.scene.floor() + height], 0)?;
+        spec.check(height).map_err(|why| self.failure(why))
+    }
 
     fn expected(&self, materials: &Materials) -> Expected {
         let all = self.scene.expected(materials);
@@ -254,7 +284,7 @@ impl Recipe for JoinedBed<'_> {
         let Some(bowl) = guard.as_mut() else {
             return Ok(Course::On);
         };
-        bowl.go_on(simulation).map_err(failure)?;
+        bowl.go_on(simulation).map_err(|why| self.failure(why))?;
         if bowl.at_exchange() {
             let head = [state[0], state[1]];
             Self::remember(&head, bowl, state);
@@ -276,8 +306,23 @@ impl Recipe for JoinedBed<'_> {
         self.scene.look(simulation, seen, state)
     }
 
+    fn has_continuum(&self) -> bool {
+        true
+    }
+
+    /// Cells of the continuum behind the handshake surface, as the last exchange left them.
+    fn continuum(&self, simulation: &Simulation, state: &[f64]) -> Option<Frame> {
+        let mut guard = self.live();
+        if guard.is_none() && !state.is_empty() {
+            *guard = self.recalled(simulation, state).ok();
+        }
+        let bowl = guard.as_ref()?;
+        let law = &bowl.spec().law;
+        Some(space_frame(&bowl.fields(), law, simulation.time()))
+    }
+
     fn conclude(&self, ran: &mut Ran, summary: &mut Summary) -> Result<Vec<Table>, Failure> {
-        let mut tables = self.scene.conclude(ran, summary)?;
+        let tables = self.scene.conclude(ran, summary)?;
         let bowl = self.recalled(&ran.simulation, &ran.state)?;
         self.book(ran, &bowl, summary);
         self.watch(&bowl, summary);
@@ -299,7 +344,6 @@ impl Recipe for JoinedBed<'_> {
                 .iter()
                 .map(String::as_str),
         );
-        tables.push(cells(&bowl));
         Ok(tables)
     }
 }
@@ -443,25 +487,4 @@ impl JoinedBed<'_> {
                 .push(format!("Overlap: {what} is {value:.4}, outside its limit."));
         }
     }
-}
-
-/// Cells of the continuum at the end.
-fn cells(bowl: &Bowl) -> Table {
-    let fields = bowl.fields();
-    let column = |f: &dyn Fn(&colluvium_continuum::free_surface::SpaceFields) -> f64| {
-        fields.iter().map(f).collect::<Vec<f64>>()
-    };
-    let mut table = Table::new("continuum");
-    for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
-        table = table.with(
-            name,
-            "m",
-            column(&|c| 0.5 * (c.lower[axis] + c.upper[axis])),
-        );
-    }
-    table = table.with("fraction", "1", column(&|c| c.fraction));
-    for (axis, name) in ["u", "v", "w"].into_iter().enumerate() {
-        table = table.with(name, "m/s", column(&|c| c.velocity[axis]));
-    }
-    table.with("p", "Pa", column(&|c| c.pressure))
 }

@@ -53,6 +53,7 @@ pub struct Ran {
 /// Checks a scene before anything is written: keys, files, laws, walls, bonds and the step, on the smallest
 /// and the largest grain of each kind.
 pub fn check(scene: &Scene, recipe: &dyn Recipe) -> Result<(), Failure> {
+    recipe.check()?;
     let origin = &scene.origin;
     let materials = recipe.materials(origin)?;
     let found = store::find(recipe, &materials, origin)?;

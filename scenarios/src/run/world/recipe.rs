@@ -75,6 +75,11 @@ pub trait Recipe: Debug + Sync {
         origin: &str,
     ) -> Result<World, Failure>;
 
+    /// Whether what only this recipe knows of fits together, before anything is written.
+    fn check(&self) -> Result<(), Failure> {
+        Ok(())
+    }
+
     /// What is to be expected.
     fn expected(&self, materials: &Materials) -> Expected;
 
