@@ -16,11 +16,6 @@ type Task = *const (dyn Fn(usize) + Sync + 'static);
 /// Most tasks of a call.
 const TASKS: usize = 32;
 
-/// Whether threads stand by at all. On a quiet machine with more threads than cores a task was handed a chunk that
-/// was not there (one run of two of the test of all laws' bits), and a caller can come to wait for itself; until the
-/// cause is found the pool alone shares out tasks.
-const STAND_BY: bool = false;
-
 /// Looks at what is to be done between two looks at what the pool has.
 const LOOKS: u32 = 32;
 
@@ -32,8 +27,10 @@ const PATIENCE: u32 = 2000;
 #[repr(align(128))]
 struct Apart<T>(T);
 
+/// Number of a thread that is none.
+const NOBODY: usize = usize::MAX;
+
 /// See the module.
-#[derive(Default)]
 pub(crate) struct Team {
     /// Number of the call, and which tasks are given out or are none, by bits: 32 each.
     call: Apart<AtomicU64>,
@@ -42,6 +39,8 @@ pub(crate) struct Team {
     /// Threads that stand by, and how many there are to be with the caller.
     helpers: AtomicUsize,
     threads: AtomicUsize,
+    /// The thread of the pool that works while the others stand by.
+    worker: AtomicUsize,
     /// Whether they may go.
     over: AtomicBool,
     task: UnsafeCell<Option<Task>>,
@@ -52,6 +51,22 @@ pub(crate) struct Team {
 unsafe impl Sync for Team {}
 // SAFETY: see above; no task outlives its call.
 unsafe impl Send for Team {}
+
+impl Default for Team {
+    /// Nothing is given out: tasks that were free before the first call would be taken, and done with the first call's
+    /// task at places where it has none.
+    fn default() -> Self {
+        Self {
+            call: Apart(AtomicU64::new(u64::from(u32::MAX))),
+            done: Apart::default(),
+            helpers: AtomicUsize::new(0),
+            threads: AtomicUsize::new(0),
+            worker: AtomicUsize::new(NOBODY),
+            over: AtomicBool::new(false),
+            task: UnsafeCell::new(None),
+        }
+    }
+}
 
 impl fmt::Debug for Team {
     fn fmt(&self, f: &mut fmt::Formatter) -> fmt::Result {
@@ -97,12 +112,15 @@ impl Drop for Leave<'_> {
 impl Team {
     /// Does some work while so many threads of the pool stand by.
     pub fn with_helpers<T: Send>(&self, helpers: usize, work: impl FnOnce() -> T + Send) -> T {
-        if helpers == 0 || !STAND_BY {
+        if helpers == 0 {
             return work();
         }
         self.over.store(false, Ordering::Release);
         self.threads.store(helpers + 1, Ordering::Release);
+        self.worker.store(NOBODY, Ordering::Release);
         let work = || {
+            let own = rayon::current_thread_index().unwrap_or(NOBODY);
+            self.worker.store(own, Ordering::Release);
             let _release = Release(self);
             work()
         };
@@ -122,6 +140,10 @@ impl Team {
     }
 
     fn wait_for_tasks(&self, own: usize) {
+        // The worker, while it waits for the pool, may come to this itself, and would wait for its own end.
+        if rayon::current_thread_index() == Some(self.worker.load(Ordering::Acquire)) {
+            return;
+        }
         self.helpers.fetch_add(1, Ordering::AcqRel);
         let _leave = Leave(self);
         let mut looks = 0;
@@ -285,6 +307,44 @@ mod tests {
                 "{items:?}"
             );
             assert!(!team.stands_by());
+        }
+    }
+
+    /// New teams, whose helpers come before, at or after the first call, and calls of few items.
+    #[test]
+    fn few_items_are_seen_once_from_the_first_call_on() {
+        for round in 0..200 {
+            let threads = 2 + round % 3;
+            let team = Team::default();
+            in_pool(threads, || {
+                team.with_helpers(threads - 1, || {
+                    for call in 0..200_usize {
+                        let count = 2 + (call + round) % 5;
+                        let mut items: Vec<[usize; 3]> = (0..count).map(|i| [i, call, 0]).collect();
+                        team.each(true, &mut items, &|item| {
+                            assert_eq!(item[1], call, "an item of another call");
+                            item[2] += 1;
+                        });
+                        let seen = items
+                            .iter()
+                            .enumerate()
+                            .all(|(i, item)| *item == [i, call, 1]);
+                        assert!(seen, "call {call} of round {round}: {items:?}");
+                    }
+                });
+            });
+        }
+    }
+
+    /// A worker that waits for the pool comes to stand by itself, and does not wait for its own end.
+    #[test]
+    fn a_worker_does_not_stand_by() {
+        for _ in 0..200 {
+            let team = Team::default();
+            let sum: usize = in_pool(3, || {
+                team.with_helpers(2, || (0..1000_usize).into_par_iter().map(|n| n % 7).sum())
+            });
+            assert_eq!(sum, (0..1000).map(|n| n % 7).sum());
         }
     }
 
