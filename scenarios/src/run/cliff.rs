@@ -6,13 +6,14 @@
 //! the crack opens: grains in it lose their cohesion and their bonds. The run is over when the debris rests.
 
 mod debris;
+mod findings;
 mod record;
 mod section;
+mod watch;
 
 use super::comet::{self, Comet};
 use super::comet_block::CometBlock;
-use super::heap::{HeapAxis, edge};
-use super::world::boulders::{boulders, size_index};
+use super::world::boulders::boulders;
 use super::world::workshop::Surroundings;
 use super::world::{Course, Expected, Ran, Recipe, Workshop, World, fragments};
 use crate::failure::Failure;
@@ -21,23 +22,20 @@ use crate::scene::{CliffScene, LawKeys, layers};
 use crate::summary::{Figure, Quantity, Summary};
 use crate::table::Table;
 use colluvium_dem::preparation::{Packing, Relaxation, Rest};
-use colluvium_dem::{Domain, Grain, Region, Simulation, Snapshot};
-use debris::{Pile, forward_turn, volume_beyond};
+use colluvium_dem::{Domain, Region, Simulation, Snapshot};
+use debris::volume_beyond;
 use nalgebra::{UnitQuaternion, Vector3};
-use record::{CliffRecord, CliffTimes};
+use record::CliffRecord;
 use std::collections::BTreeSet;
 
-/// Looks in the whole time, and looks between two profiles.
+/// Looks in the whole time.
 const LOOKS: f64 = 400.0;
-const PROFILE_EVERY: usize = 20;
 /// Share of its height by which the part before the crack has sunk when it has failed.
 const FAILED: f64 = 0.01;
 /// Speed over √(g d) that nine grains in ten of what fell stay below when it rests, and for how many looks in
 /// a row. Single grains that hang by one contact swing for hours: they do not count.
 const STILL: f64 = 0.02;
 const STILL_LOOKS: f64 = 3.0;
-/// Height over the mean diameter of parcels at which debris ends: half a layer of single parcels.
-const EDGE: f64 = 0.25;
 /// Layers that hold the cliff at its back and its bottom, in mean diameters.
 const HELD: f64 = 1.0;
 /// A cliff that has settled need not be quieter than this.
@@ -45,17 +43,6 @@ const QUIET: Rest = Rest {
     kinetic: 1e-6,
     unbalanced: 0.05,
 };
-/// Heights of the cliff beyond its lip in which debris is looked for.
-const ROOM: f64 = 4.0;
-
-/// What §4.2 of the paper says of the Aswan cliff: the pile's height (m), its distance from the wall (m), the
-/// run-out from there (m), the mean angle of repose (degrees), the share of bonds that survives, the size of the
-/// largest boulders (m).
-const ASWAN: [f64; 6] = [28.0, 15.0, 70.0, 22.0, 0.98, 10.0];
-const ASWAN_SOURCE: &str = "Kappel et al. 2020, §4.2, from 270 000 parcels";
-/// Height of that cliff (m).
-const ASWAN_HEIGHT: f64 = 130.0;
-
 impl CliffScene {
     fn comet(&self) -> Comet<'_> {
         Comet {
@@ -72,124 +59,17 @@ impl CliffScene {
         Some(comet::diameter(&materials))
     }
 
-    fn heap_axis(&self, diameter: f64) -> HeapAxis {
-        let length = self.lip() - self.back() + ROOM * self.shape.height;
-        HeapAxis {
-            start: self.back(),
-            spacing: diameter,
-            columns: (length / diameter).ceil() as usize,
-            mirrored: false,
-        }
-    }
-
-    /// What a look at the start remembers.
-    fn begin(&self, simulation: &mut Simulation) -> CliffRecord {
-        let grains = simulation.grain_list();
-        let solid: f64 = grains.iter().map(Grain::volume).sum();
-        let room = self.areas()[0] * simulation.domain().lengths().y;
-        let before = |g: &Grain| !g.fixed && self.before_crack(&g.position);
-        let face = grains.iter().enumerate().filter(|(_, g)| before(g));
-        let face = face.map(|(k, g)| [k as f64, g.position.x, g.position.z]);
-        let mut record = CliffRecord {
-            times: CliffTimes {
-                opened: f64::NAN,
-                failed: f64::NAN,
-                ..CliffTimes::default()
-            },
-            face: face.collect(),
-            ..CliffRecord::default()
-        };
-        record.heap.solid_fraction = solid / room;
-        let own: BTreeSet<u32> = record.face.iter().map(|g| g[0] as u32).collect();
-        let pairs = fragments::touching(simulation).into_iter();
-        record.pairs = pairs
-            .filter(|pair| pair.iter().all(|id| own.contains(id)))
-            .collect();
-        record
-    }
-
-    /// Opens the crack: says how many grains it made loose.
-    fn open(&self, simulation: &mut Simulation, diameter: f64) -> Result<f64, Failure> {
-        let Some(region) = self.crack_region(diameter) else {
-            return Ok(0.0);
-        };
-        let materials = CliffScene::materials(self, "")?;
-        let at = Place {
-            origin: "",
-            section: "crack",
-        };
-        let loose = materials.number("crack", "crack", at)?;
-        simulation.cut_bonds(&region);
-        let loosened = simulation
-            .convert(|g| (!g.fixed && region.contains(&g.position)).then_some(loose))
-            .map_err(|error| Failure::Run(error.to_string()))?;
-        Ok(loosened as f64)
-    }
-
-    /// How far the part before the crack has sunk, on the mean (m).
-    fn sunk(record: &CliffRecord, grains: &[Grain]) -> f64 {
-        let sunk = record
-            .face
-            .iter()
-            .map(|[k, _, z]| z - grains[*k as usize].position.z);
-        sunk.sum::<f64>() / record.face.len().max(1) as f64
-    }
-
-    /// How far the sintered part before the crack has turned forward (degrees).
-    fn turned(&self, record: &CliffRecord, grains: &[Grain]) -> f64 {
-        let low = self.shape.height - self.shape.sintered;
-        let cap = record.face.iter().filter(|g| g[2] > low);
-        let cap: Vec<_> = cap.collect();
-        let before: Vec<[f64; 2]> = cap.iter().map(|g| [g[1], g[2]]).collect();
-        let at = |k: f64| &grains[k as usize];
-        let now = cap.iter().map(|g| at(g[0]).position).map(|x| [x.x, x.z]);
-        let weights: Vec<f64> = cap.iter().map(|g| at(g[0]).mass()).collect();
-        forward_turn(&before, &now.collect::<Vec<_>>(), &weights)
-    }
-
-    /// Speed that nine grains in ten of what stood before the crack stay below (m/s).
-    fn speed(record: &CliffRecord, grains: &[Grain]) -> f64 {
-        let speeds = record.face.iter();
-        let mut speeds: Vec<f64> = speeds
-            .map(|g| grains[g[0] as usize].velocity.norm())
-            .collect();
-        speeds.sort_by(f64::total_cmp);
-        speeds.get(speeds.len() * 9 / 10).copied().unwrap_or(0.0)
-    }
-
-    fn heights(&self, grains: &[Grain], axis: &HeapAxis, base: f64) -> Vec<f64> {
-        // The wall below is part of the heap's height.
-        let rows = grains.iter().map(|g| [g.position.x, g.volume()]);
-        let mut heights = axis.heights(rows, base);
-        for (x, h) in axis.positions().into_iter().zip(&mut heights) {
-            if x < 0.0 {
-                *h += self.shape.wall;
-            }
-        }
-        heights
-    }
-
-    fn see(&self, simulation: &mut Simulation, record: &mut CliffRecord, axis: &HeapAxis) {
-        let grains = simulation.grain_list();
-        let base = record.heap.solid_fraction * simulation.domain().lengths().y;
-        let heights = self.heights(&grains, axis, base);
-        let front = edge(&axis.positions(), &heights, EDGE * axis.spacing);
-        let (time, highest) = (
-            simulation.time(),
-            heights.iter().copied().fold(0.0, f64::max),
-        );
-        if record.heap.fronts.len().is_multiple_of(PROFILE_EVERY) {
-            record.heap.profiles.push((time, heights));
-        }
-        record.heap.fronts.push([time, front, highest]);
-    }
-
-    /// Reference of the Aswan cliff, where the scene is one.
-    fn reference(&self, k: usize, quantity: Quantity, source: &str) -> Quantity {
-        if self.shape.height == ASWAN_HEIGHT {
-            quantity.against(ASWAN[k], ASWAN_SOURCE)
-        } else {
-            quantity.from(source)
+    /// The block that the cliff is cut out of, for parcels of this mean diameter (m).
+    fn block(&self, diameter: f64) -> CometBlock<'_> {
+        let margin = 2.0 * self.preparation.margin * diameter;
+        CometBlock {
+            comet: self.comet(),
+            preparation: &self.preparation,
+            needed: Vector3::new(
+                self.lip() - self.back(),
+                (self.shape.width - margin).max(0.5 * self.shape.width),
+                self.face(),
+            ),
         }
     }
 }
@@ -257,18 +137,7 @@ impl Recipe for CliffScene {
 
     fn prepare(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure> {
         let d = comet::diameter(shop.materials);
-        let margin = 2.0 * self.preparation.margin * d;
-        let needed = Vector3::new(
-            self.lip() - self.back(),
-            (self.shape.width - margin).max(0.5 * self.shape.width),
-            self.face(),
-        );
-        let block = CometBlock {
-            comet: self.comet(),
-            preparation: &self.preparation,
-            needed,
-        };
-        block.make(shop, origin)?;
+        self.block(d).make(shop, origin)?;
         let across = [shop.packing.domain.lower.y, shop.packing.domain.upper.y];
         let middle = Vector3::new(
             0.5 * (self.lip() + self.back()),
@@ -352,7 +221,10 @@ impl Recipe for CliffScene {
             grains: self
                 .comet()
                 .grains_in(self.areas()[0] * self.shape.width, materials),
-            preparation: None,
+            preparation: Some(
+                self.block(comet::diameter(materials))
+                    .grain_steps(materials),
+            ),
             duration: self.standing + self.duration,
         }
     }
@@ -513,130 +385,5 @@ impl Recipe for CliffScene {
 
     fn compared(&self) -> Vec<&'static str> {
         vec!["x_front", "pile_height", "debris_slope"]
-    }
-}
-
-impl CliffScene {
-    fn put_times(&self, record: &CliffRecord, ran: &Ran, summary: &mut Summary) {
-        let times = &record.times;
-        let rests = record.heap.resting >= STILL_LOOKS;
-        let failed = !times.failed.is_nan();
-        let stood = !times.opened.is_nan();
-        let since = |time: f64| time - if stood { times.opened } else { 0.0 };
-        let mut put = |name: &str, value: f64, unit: &str, source: &str| {
-            summary.put(name, Quantity::new(value, unit).from(source));
-        };
-        put(
-            "stood",
-            f64::from(u8::from(stood)),
-            "1",
-            "1 if it stood until the crack opened",
-        );
-        put(
-            "time_of_failure",
-            since(times.failed),
-            "s",
-            "after the crack opened, or after the support was taken away where it did not stand: what stood before the crack \
-             has sunk by a hundredth of the face's height; null where it did not",
-        );
-        put(
-            "time_of_impact",
-            since(times.peak[1]),
-            "s",
-            "the same, of the largest kinetic energy; a free fall of 30 m takes 577 s (some 10 minutes in the paper)",
-        );
-        let end = if rests {
-            since(ran.simulation.time())
-        } else {
-            f64::NAN
-        };
-        put(
-            "time_of_rest",
-            end,
-            "s",
-            "the same, of rest: up to 3600 s in the paper; null where the run ended before",
-        );
-        put(
-            "sunk_standing",
-            times.sunk_standing,
-            "m",
-            "on the mean, what stood before the crack while the cliff stood by itself",
-        );
-        put(
-            "loosened_grains",
-            times.loosened,
-            "1",
-            "in the crack, that lost their cohesion",
-        );
-        let word = match (stood, failed) {
-            (false, _) => format!(
-                "The cliff does not stand by itself: it fails {:.0} s after its support is taken away, before the crack opens.",
-                times.failed
-            ),
-            (true, true) => format!(
-                "The cliff stands by itself and fails {:.0} s after the crack has opened.",
-                since(times.failed)
-            ),
-            (true, false) => "The cliff stands, and the crack does not bring it down.".into(),
-        };
-        summary.remarks.push(word);
-        if !rests {
-            summary
-                .remarks
-                .push("Still moving at the end: a longer duration is needed.".into());
-        }
-    }
-
-    fn put_pile(&self, places: &[f64], deposit: &[f64], d: f64, summary: &mut Summary) {
-        let pile = Pile::of(places, deposit, 0.0, EDGE * d);
-        let of = |f: &dyn Fn(&Pile) -> f64| pile.as_ref().map_or(f64::NAN, f);
-        let m = |value: f64| Quantity::new(value, "m");
-        let degrees = |value: f64| Quantity::new(value, "degrees");
-        let end = m(of(&|p| p.end)).from("where the debris is a quarter of a mean parcel high");
-        summary.put("x_front", end);
-        let height = m(of(&|p| p.height));
-        let source = "greatest height of the pile beyond the foot";
-        summary.put("pile_height", self.reference(0, height, source));
-        let top = m(of(&|p| p.top));
-        let source = "where the pile is highest, from the foot";
-        summary.put("pile_top", self.reference(1, top, source));
-        let runout = m(of(&|p| p.end - p.top));
-        let source = "of the debris from the pile's top";
-        summary.put("runout", self.reference(2, runout, source));
-        let repose = degrees(of(&Pile::repose_degrees));
-        let source =
-            "atan(pile's height over run-out from its top); 20 to 30 on 67P (Vincent et al. 2016)";
-        summary.put("repose", self.reference(3, repose, source));
-        let wedge = degrees(of(&Pile::wedge_degrees));
-        let source = "of the wedge from the foot with the debris' area and length: atan(2 A/L²)";
-        summary.put("debris_slope", wedge.from(source));
-    }
-
-    fn put_boulders(&self, ran: &mut Ran, sizes: &Table, summary: &mut Summary) {
-        let diameters = sizes.column("diameter");
-        let count = Quantity::new(diameters.len() as f64, "1");
-        summary.put(
-            "boulders",
-            count.from("of two grains and more, joined by bonds"),
-        );
-        let largest = diameters.first().copied().unwrap_or(f64::NAN);
-        let source = "diameter of the ball that its grains fill at the cliff's solid fraction";
-        let largest = self.reference(5, Quantity::new(largest, "m"), source);
-        summary.put("largest_boulder", largest);
-        let [index, error] = size_index(diameters);
-        let index = Quantity::new(index, "1").with_error(error);
-        summary.put(
-            "boulder_size_index",
-            index.against(
-                3.6,
-                "observed at Aswan (Pajola et al. 2017); null for fewer than ten boulders",
-            ),
-        );
-        let bonds = ran.simulation.bond_count();
-        let survive = Quantity::new(1.0 - bonds.broken_share(), "1");
-        let source = "of the bonds that the crack left";
-        if bonds.whole + bonds.torn + bonds.sheared > 0 {
-            summary.put("bond_survival", self.reference(4, survive, source));
-        }
     }
 }

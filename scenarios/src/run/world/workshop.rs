@@ -4,9 +4,12 @@
 //! and takes it back. It has a time step of its own, from its own speeds.
 
 mod clumps;
+mod cutting;
 mod report;
+mod surroundings;
 
-use super::fragments;
+pub use surroundings::{Surroundings, open_space, softened, stand_ins, step_for, with_friction};
+
 use crate::failure::Failure;
 use crate::journal::Journal;
 use crate::scene::world::Materials;
@@ -16,11 +19,8 @@ use colluvium_dem::preparation::{
     RestMeasures, Stages, TRIES, compact, grow, insert_loose, jam, pour, relax, settle_in_stages,
 };
 use colluvium_dem::timestep::{Conditions, Shares};
-use colluvium_dem::{
-    BoxMotion, Domain, Edge, Grain, Laws, Mindlin, Normal, Region, Setup, SetupError, Simulation,
-    Tangential, TangentialSpring, Threads, Wall,
-};
-use nalgebra::{UnitQuaternion, Vector3};
+use colluvium_dem::{BoxMotion, Edge, Grain, Laws, Region, Setup, SetupError, Simulation, Threads};
+use nalgebra::Vector3;
 use std::ops::ControlFlow;
 
 /// A packing in the making.
@@ -45,93 +45,6 @@ pub struct Workshop<'a> {
     watch: &'a mut dyn FnMut(&RestMeasures) -> ControlFlow<()>,
 }
 
-/// What surrounds a packing during a step.
-#[derive(Clone, Debug)]
-pub struct Surroundings {
-    /// Contact laws of this step.
-    pub laws: Laws,
-    /// Walls.
-    pub walls: Vec<Wall>,
-    /// Uniform acceleration (m/s²).
-    pub gravity: Vector3<f64>,
-    /// Largest speed of two surfaces against each other (m/s).
-    pub speed: f64,
-}
-
-impl Surroundings {
-    /// Nothing but the law.
-    pub fn none(laws: Laws) -> Surroundings {
-        Surroundings {
-            laws,
-            walls: Vec::new(),
-            gravity: Vector3::zeros(),
-            speed: 0.0,
-        }
-    }
-}
-
-/// The laws with another friction.
-pub fn with_friction(laws: &Laws, friction: f64) -> Laws {
-    let mut laws = laws.clone();
-    let pairs = laws.pairs.iter_mut().map(|(_, _, law)| law);
-    for law in laws.own.iter_mut().chain(pairs) {
-        law.tangential = match law.tangential {
-            Tangential::Linear(spring) => {
-                Tangential::Linear(TangentialSpring { friction, ..spring })
-            }
-            Tangential::Mindlin(mindlin) => Tangential::Mindlin(Mindlin {
-                friction,
-                ..mindlin
-            }),
-            other => other,
-        };
-    }
-    laws
-}
-
-/// The laws of Hooke and Hertz at a multiple of their stiffness; others as they are.
-pub fn softened(laws: &Laws, factor: f64) -> Laws {
-    let mut laws = laws.clone();
-    let pairs = laws.pairs.iter_mut().map(|(_, _, law)| law);
-    for law in laws.own.iter_mut().chain(pairs) {
-        match &mut law.normal {
-            Normal::Hooke(hooke) => hooke.stiffness *= factor,
-            Normal::Hertz(hertz) => hertz.effective_modulus *= factor,
-            _ => continue,
-        }
-        if let Tangential::Mindlin(mindlin) = &mut law.tangential {
-            mindlin.effective_shear *= factor;
-        }
-    }
-    laws
-}
-
-/// The step (s) of a preparation of such grains in such surroundings, where anything limits it.
-pub fn step_for(materials: &Materials, around: &Surroundings, safety: f64) -> Option<f64> {
-    let grains = stand_ins(materials);
-    let fall = Conditions::of(&grains, &around.gravity);
-    let conditions = Conditions {
-        speed: fall.speed + around.speed,
-        ..fall
-    };
-    let shares = Shares {
-        safety,
-        ..Shares::default()
-    };
-    let setup = Setup {
-        domain: open_space(),
-        gravity: around.gravity,
-        law: around.laws.clone(),
-        grains,
-        walls: around.walls.clone(),
-        bodies: Vec::new(),
-        timestep: 1.0,
-        threads: Threads::Serial,
-    };
-    let choice = setup.choose_step(&conditions, &shares).ok()?;
-    choice.seconds.is_finite().then_some(choice.seconds)
-}
-
 /// How a periodic box is shrunk, or widened, about its centre.
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Squeeze {
@@ -139,15 +52,6 @@ pub struct Squeeze {
     pub solid_fraction: f64,
     /// Time that it takes (s).
     pub time: f64,
-}
-
-/// Open space: a box that holds nothing in.
-pub fn open_space() -> Domain {
-    Domain {
-        lower: Vector3::repeat(-1.0),
-        upper: Vector3::repeat(1.0),
-        periodic: [false; 3],
-    }
 }
 
 impl<'a> Workshop<'a> {
@@ -324,22 +228,6 @@ impl<'a> Workshop<'a> {
         Ok(rests)
     }
 
-    /// Takes away what does not hang together, by contacts, with the heaviest piece; says how many grains.
-    pub fn keep_heaviest(&mut self) -> usize {
-        let grains = &self.packing.grains;
-        let masses: Vec<f64> = grains.iter().map(Grain::mass).collect();
-        let mut stays = vec![false; grains.len()];
-        let pieces = fragments::joined(&masses, &self.packing.contacts);
-        let heaviest = pieces.first().map_or(&[][..], |piece| &piece.grains);
-        heaviest.iter().for_each(|&grain| stays[grain] = true);
-        let gone = self.packing.keep_those(stays);
-        self.note(
-            "trim",
-            format!("{gone} grains taken away that did not hang on"),
-        );
-        gone
-    }
-
     /// Lets the grains go for a time (s), and stops what still moves.
     pub fn let_go(&mut self, around: &Surroundings, time: f64) -> Result<(), Failure> {
         let mut simulation = self.simulation(around)?;
@@ -465,82 +353,6 @@ impl<'a> Workshop<'a> {
         );
         Ok(())
     }
-
-    /// Keeps grains in a region: whole ones, or those whose centres lie in it.
-    pub fn trim(&mut self, region: &Region, whole: bool) -> Result<(), Failure> {
-        let gone = if whole {
-            self.packing.trim_whole(region)
-        } else {
-            self.packing.trim(region)
-        };
-        let gone = gone.map_err(refused)?;
-        let left = self.packing.grains.len();
-        self.note(
-            "trim",
-            format!("{gone} grains taken away, {left} left, in {region}"),
-        );
-        self.check_left()
-    }
-
-    /// Keeps grains of which a rule says so; what it says in words is noted.
-    pub fn keep_where(
-        &mut self,
-        words: &str,
-        rule: impl Fn(&Grain) -> bool,
-    ) -> Result<(), Failure> {
-        let stays = self.packing.grains.iter().map(rule).collect();
-        let gone = self.packing.keep_those(stays);
-        let left = self.packing.grains.len();
-        self.note(
-            "trim",
-            format!("{gone} grains taken away, {left} left, in {words}"),
-        );
-        self.check_left()
-    }
-
-    fn check_left(&self) -> Result<(), Failure> {
-        if self.packing.grains.is_empty() {
-            return Err(Failure::Run("preparation: no grains are left".into()));
-        }
-        Ok(())
-    }
-
-    /// Fixes grains in a region.
-    pub fn glue(&mut self, region: &Region) -> Result<(), Failure> {
-        let count = self.packing.glue(region).map_err(refused)?;
-        self.note("glue", format!("{count} grains fixed in {region}"));
-        Ok(())
-    }
-
-    /// Multiplies all lengths.
-    pub fn scale(&mut self, factor: f64) -> Result<(), Failure> {
-        self.packing.scale(factor).map_err(refused)?;
-        self.note("scale", format!("all lengths times {factor}"));
-        Ok(())
-    }
-
-    /// Turns the packing about the origin and moves it.
-    pub fn place(&mut self, turn: UnitQuaternion<f64>, by: Vector3<f64>) -> Result<(), Failure> {
-        self.packing
-            .place(Vector3::zeros(), turn, by)
-            .map_err(refused)
-    }
-
-    /// Opens all axes of the box.
-    pub fn open(&mut self) {
-        self.packing.domain.periodic = [false; 3];
-    }
-}
-
-/// The smallest and the largest grain of each kind, at the origin.
-pub fn stand_ins(materials: &Materials) -> Vec<Grain> {
-    let both = materials.ingredients.iter().flat_map(|i| {
-        [i.sizes.smallest(), i.sizes.largest()].map(|radius| Grain {
-            material: i.material,
-            ..Grain::at_rest(Vector3::zeros(), radius, i.density)
-        })
-    });
-    both.collect()
 }
 
 fn refused(error: SetupError) -> Failure {
