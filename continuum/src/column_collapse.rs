@@ -8,7 +8,7 @@
 
 mod ground;
 
-pub use ground::CollapseGround;
+pub use ground::{CollapseGround, Matter};
 
 use serde::{Deserialize, Serialize};
 
@@ -233,6 +233,50 @@ impl<L: ShearLaw + Clone> Collapse<L> {
             ground: Some(ground.clone()),
             ..Self::of_flow(case, options, flow)
         })
+    }
+
+    /// Matter of any shape, on the move, over ground: what `matter` says of the grid, whose cells reach up to `top`
+    /// (m) at least. Of the case's column only the height is used, as the unit of length.
+    ///
+    /// # Errors
+    /// Parameters or settings out of range, ground that does not span the grid, or [`Error::ForeignState`] for matter
+    /// of another grid.
+    pub fn of_matter(
+        case: &CollapseCase<L>,
+        options: &SurfaceOptions,
+        ground: &CollapseGround,
+        top: f64,
+        matter: impl FnOnce(&Self) -> Matter,
+    ) -> Result<Self, Error> {
+        case.validate()?;
+        let (flow, bottom) = case.bare(ground, top, options)?;
+        let mut collapse = Self {
+            bottom,
+            ground: Some(ground.clone()),
+            ..Self::of_flow(case, options, flow)
+        };
+        let Matter {
+            fractions,
+            velocity,
+        } = matter(&collapse);
+        let unit = collapse.units.velocity;
+        collapse.flow.set_state(SurfaceState {
+            fractions,
+            velocity: velocity.map(|u| u.into_iter().map(|u| u / unit).collect()),
+            ..collapse.flow.state().clone()
+        })?;
+        collapse.start_volume = collapse.flow.volume();
+        Ok(collapse)
+    }
+
+    /// Lower corner of the grid (m).
+    pub fn origin(&self) -> [f64; 2] {
+        [0.0, self.bottom]
+    }
+
+    /// Edge of a cell (m).
+    pub fn spacing(&self) -> f64 {
+        self.flow.grid().axes()[0].spacing() * self.case.height
     }
 
     /// Heights of the ground under the columns of cells (m): zero on a level floor.

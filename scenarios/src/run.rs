@@ -6,7 +6,7 @@ pub mod ball_impact;
 pub mod bed;
 mod boulder;
 pub mod chute;
-mod cliff;
+pub mod cliff;
 pub mod collapse;
 pub mod collapse_ground;
 mod column_of_grains;

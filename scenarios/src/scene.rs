@@ -13,6 +13,7 @@ mod boulder;
 mod check;
 mod chute;
 mod cliff;
+mod cliff_runout;
 mod collapse;
 mod collapse_grains;
 mod collapse_terrain;
@@ -45,6 +46,7 @@ pub use bed::Pace;
 pub use boulder::BoulderScene;
 pub use chute::ChuteScene;
 pub use cliff::{CliffCrackKeys, CliffModel, CliffScene, CliffShapeKeys};
+pub use cliff_runout::CliffRunoutKeys;
 pub use collapse::{
     CollapseGrid, CollapseModel, CollapseScene, CollapseSolver, CollapseWalls, ThinLayerKind,
 };

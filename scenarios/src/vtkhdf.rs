@@ -69,6 +69,18 @@ pub struct Frame {
     pub fields: Vec<Field>,
 }
 
+/// All kinds; their cells have different numbers of points.
+const KINDS: [Cells; 5] = [
+    Cells::Points,
+    Cells::Lines,
+    Cells::Triangles,
+    Cells::Quadrilaterals,
+    Cells::Hexahedra,
+];
+
+/// Attribute of a file: points of each of its cells.
+const CORNERS: &str = "PointsOfACell";
+
 impl Cells {
     /// Points of a cell.
     pub fn points_each(self) -> usize {

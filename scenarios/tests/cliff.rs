@@ -4,24 +4,11 @@
 
 mod command;
 
-use command::{colluvium, succeed, summary, table, value};
-
-/// A cliff of some 250 parcels; softer grains than the paper's allow longer steps.
-const SMALL: [&str; 9] = [
-    "coarse_graining=960",
-    "material.smallest_diameter=1.5e-3",
-    "material.largest_diameter=3e-3",
-    "shape.width=9",
-    "shape.behind=9",
-    "timestep.safety=1",
-    "standing=300",
-    "output.pictures=1",
-    "packing=small",
-];
+use command::{SMALL_COMET_CLIFF, colluvium, hash, succeed, summary, table, value};
 
 fn run<'a>(out: &'a str, sets: &[&'a str]) -> Vec<&'a str> {
     let mut list = vec!["run", "cliff", "--out", out];
-    for set in SMALL.iter().chain(sets) {
+    for set in SMALL_COMET_CLIFF.iter().chain(sets) {
         list.extend(["--set", set]);
     }
     list
@@ -73,11 +60,73 @@ fn cliff_falls_along_its_crack() {
     assert!(value(&stands, "debris_share") < 0.8);
 }
 
+/// Debris that becomes a continuum: the same fall up to then, no volume or momentum lost, and an end where its grains end.
+/// Without friction it runs away.
+#[test]
+fn debris_runs_out_as_a_continuum() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    succeed(folder.path(), &run("c", &["output.frames=0"]));
+    succeed(
+        folder.path(),
+        &run("h", &["model=hybrid", "output.frames=10"]),
+    );
+    let slippery = [
+        "model=hybrid",
+        "runout.mu_s=0.01",
+        "runout.mu_2=0.01",
+        "runout.cohesion=0",
+        "output.frames=0",
+    ];
+    succeed(folder.path(), &run("s", &slippery));
+    let [grains, joined, control] = ["c", "h", "s"].map(|name| summary(&at(name)));
+    for name in ["x_front", "pile_height", "debris_slope", "time_of_rest"] {
+        println!(
+            "{name}: {:?}",
+            [&grains, &joined, &control].map(|s| s["results"][name]["value"].as_f64())
+        );
+    }
+    // The same bits for another number of threads.
+    let threads = [
+        &run("t", &["model=hybrid", "output.frames=0"])[..],
+        &["--threads", "2"],
+    ]
+    .concat();
+    succeed(folder.path(), &threads);
+    assert_eq!(hash(&at("t")), hash(&at("h")));
+    for name in ["time_of_failure", "sunk_standing", "loosened_grains"] {
+        assert_eq!(value(&grains, name), value(&joined, name), "{name}");
+    }
+    for name in ["handed_volume_error", "handed_momentum_error"] {
+        let error = value(&joined, name);
+        assert!(error.abs() < 1e-12, "{name} {error}");
+    }
+    let drift = joined["ledger"]["mass_relative"].as_f64().unwrap();
+    assert!(drift.abs() < 1e-12, "{drift}");
+    // The deposit has the area that the cliff had: what is held and what ran out together.
+    let (_, deposit) = table(&at("h/deposit.csv"));
+    let spacing = deposit[1][0] - deposit[0][0];
+    let area = |rows: &[Vec<f64>], k: usize| rows.iter().map(|row| row[k] * spacing).sum::<f64>();
+    let (_, profiles) = table(&at("h/profiles.csv"));
+    let before = area(&profiles[..deposit.len()], 2);
+    assert!((area(&deposit, 1) / before - 1.0).abs() < 1e-9);
+    assert!(value(&joined, "time_of_rest") > 300.0);
+    let [own, theirs, away] = [&joined, &grains, &control].map(|s| value(s, "x_front"));
+    assert!((own / theirs - 1.0).abs() < 0.3, "{own} {theirs}");
+    assert!(away > 1.5 * theirs, "{away} {theirs}");
+    assert!(at("h/continuum.vtkhdf").exists() && at("h/animation.gif").exists());
+    let saved = joined["cost"]["grain_steps"].as_f64().unwrap();
+    assert!(saved < grains["cost"]["grain_steps"].as_f64().unwrap());
+}
+
 #[test]
 fn bad_cliffs_are_refused_by_key() {
     let folder = tempfile::tempdir().unwrap();
     for (set, key, allowed) in [
-        ("model=hybrid", "model", "dem"),
+        ("runout.mu_2=0.1", "runout.mu_2", "at least mu_s"),
+        ("runout.friction=0.4", "runout.friction", "coulomb"),
+        ("runout.contact=coulomb", "runout.friction", "coulomb"),
+        ("runout.kinetic_share=0", "runout.kinetic_share", "(0, 1]"),
         ("coarse_graining=400", "coarse_graining", "at most 333.333"),
         ("shape.wall=30", "shape.wall", "below the height"),
         ("shape.overhang_degrees=61", "shape.overhang_degrees", "60"),

@@ -4,7 +4,10 @@
 
 mod command;
 
-use command::{MOVING_EDGE, SMALL_HYBRID, SMALL_JOINED_COLUMN, colluvium, hash, succeed, table};
+use command::{
+    MOVING_EDGE, SMALL_COMET_CLIFF, SMALL_HYBRID, SMALL_JOINED_COLUMN, colluvium, hash, succeed,
+    table,
+};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::path::Path;
@@ -172,6 +175,13 @@ fn a_killed_joined_column_goes_on_in_the_middle_of_an_exchange() {
     let moves = killed_and_whole("column-collapse", &sets, 11, 3);
     let moves = table(&moves.path().join("parts/moves.csv")).1;
     assert!(!moves.is_empty());
+}
+
+/// Before and after its debris has become a continuum.
+#[test]
+fn a_killed_cliff_goes_on_as_grains_and_as_a_continuum() {
+    let sets = [SMALL_COMET_CLIFF, &["model=hybrid", "output.frames=4"]].concat();
+    killed_and_whole("cliff", &sets, 13, 5);
 }
 
 #[test]

@@ -3,6 +3,7 @@
 use super::{CollapseCase, ROOM_ABOVE};
 use crate::error::{Error, require};
 use crate::free_surface::{Contact, SurfaceFlow, SurfaceOptions, Terrain};
+use crate::grid::Grid;
 use crate::rheology::ShearLaw;
 use crate::terrain::Profile;
 
@@ -35,34 +36,33 @@ impl CollapseGround {
 /// Most cells of a grid over ground.
 const MOST_CELLS: f64 = 4e6;
 
+/// A grid over ground, in natural units.
+struct Laid {
+    grid: Grid,
+    terrain: Terrain,
+    spacing: f64,
+    /// Cells along x and z.
+    counts: [usize; 2],
+}
+
 impl<L: ShearLaw + Clone> CollapseCase<L> {
-    /// The column at rest on ground, in natural units, and the height of the grid's lower edge (m).
-    pub(super) fn flow_over(
-        &self,
-        ground: &CollapseGround,
-        options: &SurfaceOptions,
-    ) -> Result<(SurfaceFlow<L>, f64), Error> {
+    /// The grid over ground, with room up to a height (m) at least, and the height of its lower edge (m).
+    fn lay(&self, ground: &CollapseGround, top: f64) -> Result<Laid, Error> {
         let spacing = self.length_scaled / self.cells as f64;
         let length = self.length_scaled * self.height;
-        let foot = ground.profile.height_at(0.0).unwrap_or(f64::NAN);
         require(
-            foot.is_finite() && ground.profile.height_at(length).is_some(),
+            [0.0, length]
+                .iter()
+                .all(|x| ground.profile.height_at(*x).is_some()),
             "terrain.profile",
             length,
             format!("ground at all x from 0 to the end of the grid at {length} m"),
         )?;
-        require(
-            self.overhang_degrees == 0.0,
-            "overhang_degrees",
-            self.overhang_degrees,
-            "0 over terrain: the column's face stands upright there",
-        )?;
         let units = self.units();
         let [low, high] = ground.span(length).map(|z| z / self.height);
-        let foot = foot / self.height;
         // A row of ground below, and room above what is highest.
         let bottom = low - spacing;
-        let top = (foot + 1.0).max(high) + (ROOM_ABOVE - 1.0);
+        let top = (top / self.height).max(high) + (ROOM_ABOVE - 1.0);
         let rows = ((top - bottom) / spacing).ceil();
         require(
             rows * self.cells as f64 <= MOST_CELLS,
@@ -75,20 +75,64 @@ impl<L: ShearLaw + Clone> CollapseCase<L> {
             ),
         )?;
         let rows = rows as usize;
-        let grid = self.grid(spacing, rows)?;
         let points = ground.profile.points().iter();
-        let terrain = Terrain {
-            profile: Profile::new(points.map(|p| p.map(|x| x / self.height)).collect())?,
-            origin: [0.0, bottom],
-            contact: match ground.contact {
-                Contact::Coulomb(friction) => Contact::Coulomb(friction.in_units(&units)),
-                other => other,
+        Ok(Laid {
+            grid: self.grid(spacing, rows)?,
+            terrain: Terrain {
+                profile: Profile::new(points.map(|p| p.map(|x| x / self.height)).collect())?,
+                origin: [0.0, bottom],
+                contact: match ground.contact {
+                    Contact::Coulomb(friction) => Contact::Coulomb(friction.in_units(&units)),
+                    other => other,
+                },
+                rise: 0,
             },
-            rise: 0,
-        };
-        let column = [1.0 / self.aspect, foot + 1.0];
+            spacing,
+            counts: [self.cells, rows],
+        })
+    }
+
+    /// A flow over a grid, with this part of each cell filled.
+    fn flow_on(
+        &self,
+        laid: Laid,
+        fractions: Vec<f64>,
+        options: &SurfaceOptions,
+    ) -> Result<(SurfaceFlow<L>, f64), Error> {
+        let bottom = laid.terrain.origin[1] * self.height;
+        let law = self.rheology.in_units(&self.units());
+        let flow = SurfaceFlow::over_ground(
+            laid.grid,
+            &laid.terrain,
+            fractions,
+            law,
+            [0.0, -1.0],
+            *options,
+        )?;
+        Ok((flow, bottom))
+    }
+
+    /// The column at rest on ground, in natural units, and the height of the grid's lower edge (m).
+    pub(super) fn flow_over(
+        &self,
+        ground: &CollapseGround,
+        options: &SurfaceOptions,
+    ) -> Result<(SurfaceFlow<L>, f64), Error> {
+        require(
+            self.overhang_degrees == 0.0,
+            "overhang_degrees",
+            self.overhang_degrees,
+            "0 over terrain: the column's face stands upright there",
+        )?;
+        let foot = ground.profile.height_at(0.0).unwrap_or(f64::NAN);
+        let laid = self.lay(ground, foot + self.height)?;
+        let Laid {
+            terrain, spacing, ..
+        } = &laid;
+        let column = [1.0 / self.aspect, foot / self.height + 1.0];
+        let [columns, rows] = laid.counts;
         let fractions = (0..rows)
-            .flat_map(|k| (0..self.cells).map(move |i| [i, k]))
+            .flat_map(|k| (0..columns).map(move |i| [i, k]))
             .map(|index| {
                 let corner: [f64; 2] =
                     std::array::from_fn(|a| terrain.origin[a] + index[a] as f64 * spacing);
@@ -99,8 +143,27 @@ impl<L: ShearLaw + Clone> CollapseCase<L> {
                 part.clamp(0.0, 1.0)
             })
             .collect();
-        let law = self.rheology.in_units(&units);
-        let flow = SurfaceFlow::over_ground(grid, &terrain, fractions, law, [0.0, -1.0], *options)?;
-        Ok((flow, bottom * self.height))
+        self.flow_on(laid, fractions, options)
     }
+
+    /// Ground without any matter on it, with room up to a height (m), and the height of the grid's lower edge (m).
+    pub(super) fn bare(
+        &self,
+        ground: &CollapseGround,
+        top: f64,
+        options: &SurfaceOptions,
+    ) -> Result<(SurfaceFlow<L>, f64), Error> {
+        let laid = self.lay(ground, top)?;
+        let nothing = vec![0.0; laid.counts.iter().product()];
+        self.flow_on(laid, nothing, options)
+    }
+}
+
+/// Matter on a grid as it stands at an instant; SI units.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub struct Matter {
+    /// Part of each cell that it fills, x fastest: at most what ground leaves free.
+    pub fractions: Vec<f64>,
+    /// Velocity (m/s) through each face of each component, x fastest: one face more than cells along the component.
+    pub velocity: [Vec<f64>; 2],
 }

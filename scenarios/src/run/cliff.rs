@@ -7,7 +7,9 @@
 
 mod debris;
 mod findings;
+pub mod joined;
 mod record;
+mod runout;
 mod section;
 mod watch;
 
@@ -19,7 +21,7 @@ use super::world::{Course, Expected, Ran, Recipe, Workshop, World, fragments};
 use crate::failure::Failure;
 use crate::scene::world::{Materials, OutputKeys, Place, StepKeys};
 use crate::scene::{CliffScene, LawKeys, layers};
-use crate::summary::{Figure, Quantity, Summary};
+use crate::summary::{Figure, Summary};
 use crate::table::Table;
 use colluvium_dem::preparation::{Packing, Relaxation, Rest};
 use colluvium_dem::{Domain, Region, Simulation, Snapshot};
@@ -122,6 +124,7 @@ impl Recipe for CliffScene {
             "standing",
             "duration",
             "output",
+            "runout",
             "sinter",
             "shape.sintered",
             "crack.depth_scaled",
@@ -347,27 +350,17 @@ impl Recipe for CliffScene {
         self.put_times(&record, ran, summary);
         self.put_pile(&places, &deposit, d, summary);
         let beyond = volume_beyond(&ran.seen.grains, 0.0) / record.heap.solid_fraction;
-        let source =
-            "beyond the foot, at the cliff's solid fraction, over what stood before the crack";
         let share = beyond / (across * self.areas()[1]);
-        summary.put("debris_share", Quantity::new(share, "1").from(source));
         let now: BTreeSet<[u32; 2]> = fragments::touching(&mut ran.simulation)
             .into_iter()
             .collect();
         let held = record.pairs.iter().filter(|pair| now.contains(*pair));
         let held = held.count() as f64 / record.pairs.len().max(1) as f64;
-        let source = "of the contacts before the crack at the start";
-        summary.put("held_contact_share", Quantity::new(held, "1").from(source));
-        let source = "of the sintered part before the crack, forward positive";
-        let turn = Quantity::new(self.turned(&record, &grains), "degrees").from(source);
-        summary.put("forward_turn", turn);
-        summary.put(
-            "solid_fraction",
-            Quantity::new(record.heap.solid_fraction, "1").from("of the cliff before"),
-        );
+        let turned = self.turned(&record, &grains);
+        self.put_broken(share, [held, turned], &record, summary);
         let clusters = ran.simulation.clusters();
         let sizes = boulders(&clusters, self.material.solid_fraction());
-        self.put_boulders(ran, &sizes, summary);
+        self.put_boulders(bonds_that_survive(&mut ran.simulation), &sizes, summary);
         summary.figures.push(Figure::history(
             "kinetic energy [J]",
             &[("translation", "translation"), ("rotation", "rotation")],
@@ -385,5 +378,15 @@ impl Recipe for CliffScene {
 
     fn compared(&self) -> Vec<&'static str> {
         vec!["x_front", "pile_height", "debris_slope"]
+    }
+}
+
+/// Share of the bonds that the crack left that are whole; not a number where there are none.
+fn bonds_that_survive(simulation: &mut Simulation) -> f64 {
+    let bonds = simulation.bond_count();
+    if bonds.whole + bonds.torn + bonds.sheared > 0 {
+        1.0 - bonds.broken_share()
+    } else {
+        f64::NAN
     }
 }

@@ -1,6 +1,7 @@
 //! Keys of the collapse of a cliff.
 
 use super::boulder::GroundKeys;
+use super::cliff_runout::CliffRunoutKeys;
 use super::comet::{CometBlockKeys, CometKeys};
 use super::world::{BondKeys, Materials, OutputKeys, Place, StepKeys, SurfaceKeys};
 use super::{CohesionKind, LawKeys, SceneError};
@@ -57,6 +58,9 @@ pub struct CliffScene {
     pub contact: LawKeys,
     /// Bonds of ice to ice in the top layer, where the material is sintered.
     pub sinter: BondKeys,
+    /// Its debris as a continuum, with `model = "hybrid"`.
+    #[serde(default)]
+    pub runout: CliffRunoutKeys,
     /// The step.
     #[serde(default)]
     pub timestep: StepKeys,
@@ -140,11 +144,7 @@ impl CliffScene {
 
     pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {
         let at = |section| Place { origin, section };
-        if self.model == CliffModel::Hybrid {
-            let range = "dem: the debris' run-out as a continuum waits for a continuum with terrain whose edge to the \
-                         grains moves";
-            return Err(at("").refuse("model", "hybrid", range));
-        }
+        self.check_runout(origin)?;
         self.material.check_together(origin)?;
         self.preparation
             .softness()

@@ -3,10 +3,11 @@
 //! A scene is a struct of keys, a recipe (`run::world::Recipe`) and a bundled file of the same name.
 
 use super::{
-    AngleOfReposeScene, BallImpactScene, BallModel, BoulderScene, CliffScene, GrainsScene,
-    SceneError, SiloScene, TensileScene, TumblingBoxScene,
+    AngleOfReposeScene, BallImpactScene, BallModel, BoulderScene, CliffModel, CliffScene,
+    GrainsScene, SceneError, SiloScene, TensileScene, TumblingBoxScene,
 };
 use crate::run::ball_impact::joined::JoinedBed;
+use crate::run::cliff::joined::JoinedCliff;
 use crate::run::world::Recipe;
 use serde_json::Value;
 
@@ -90,6 +91,9 @@ impl Kind {
         match self {
             Kind::BallImpact(keys) if keys.model == BallModel::Hybrid => {
                 act(&JoinedBed::new(keys, origin))
+            }
+            Kind::Cliff(keys) | Kind::CliffAswan(keys) if keys.model == CliffModel::Hybrid => {
+                act(&JoinedCliff::new(keys, origin))
             }
             _ => act(self.recipe()),
         }

@@ -1,6 +1,6 @@
 //! Series read back.
 
-use super::{Cells, Field, Frame, Values};
+use super::{CORNERS, Cells, Field, Frame, KINDS, Values};
 use crate::failure::Failure;
 use crate::results_file::{read_attribute, reason};
 use hdf5::{Dataset, Group};
@@ -89,25 +89,13 @@ fn read(path: &Path) -> hdf5::Result<Vec<Frame>> {
     Ok(frames)
 }
 
-/// Kind of the cells of a file. There may be none at this instant; the fields are over something nevertheless.
+/// Kind of the cells of a file, whether it holds any or not.
 fn kind_of(root: &Group) -> hdf5::Result<Cells> {
-    if root.link_exists("Connectivity") {
-        return Ok(Cells::Hexahedra);
-    }
-    let all = |name: &str| -> hdf5::Result<i64> {
-        let counts = root.dataset(&format!("Polygons/{name}"))?;
-        Ok(counts.read_raw::<i64>()?.iter().sum())
-    };
-    let (corners, polygons) = (all("NumberOfConnectivityIds")?, all("NumberOfCells")?);
-    Ok(if polygons > 0 && corners == 3 * polygons {
-        Cells::Triangles
-    } else if polygons > 0 {
-        Cells::Quadrilaterals
-    } else if root.link_exists(Cells::Lines.data()) {
-        Cells::Lines
-    } else {
-        Cells::Points
-    })
+    let corners: i64 = root.attr(CORNERS)?.read_scalar()?;
+    let kind = KINDS
+        .into_iter()
+        .find(|kind| kind.points_each() as i64 == corners);
+    kind.ok_or_else(|| format!("cells of {corners} points").into())
 }
 
 /// Numbers of the shared points at the corners of cells, step by step.

@@ -1,6 +1,6 @@
 //! A file in the making: its groups and datasets, to which frames are appended.
 
-use super::{Cells, Frame, Values};
+use super::{CORNERS, Cells, Frame, Values};
 use crate::results_file::attribute;
 use hdf5::types::FixedAscii;
 use hdf5::{Dataset, Extent, Group, H5Type};
@@ -41,6 +41,10 @@ impl Series {
             .shape(2)
             .create("Version")?
             .write_raw(&[2_i64, 0])?;
+        // A series may hold instants without cells, or none with any: their kind stands here.
+        root.new_attr::<i64>()
+            .create(CORNERS)?
+            .write_scalar(&(like.cells.points_each() as i64))?;
         let counts = |at: &Group, name: &str| list::<i64>(at, name);
         counts(root, "NumberOfPoints")?;
         table::<f64>(root, "Points", 3)?;

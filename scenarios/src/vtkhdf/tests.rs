@@ -43,6 +43,7 @@ fn a_frame_reads_back() {
         (Cells::Lines, 0),
         (Cells::Triangles, 9),
         (Cells::Quadrilaterals, 8),
+        (Cells::Quadrilaterals, 0),
         (Cells::Hexahedra, 16),
         (Cells::Hexahedra, 0),
     ] {
@@ -78,4 +79,14 @@ fn a_series_is_not_a_frame_and_neither_is_rubbish() {
     );
     std::fs::write(&path, "rubbish").unwrap();
     assert!(read_frame(&path).is_err());
+}
+
+/// A series whose first instant holds no cells is one of those that follow.
+#[test]
+fn a_series_may_begin_with_nothing() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("continuum.vtkhdf");
+    let frames = [(0.0, 0), (1.0, 8)].map(|(t, n)| frame(t, n, Cells::Quadrilaterals));
+    write(&path, frames.clone().map(Ok)).unwrap();
+    assert_eq!(read_series(&path).unwrap(), frames);
 }

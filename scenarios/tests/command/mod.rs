@@ -6,6 +6,19 @@ use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};
 
+/// A cliff of some 250 parcels; softer grains than the paper's allow longer steps.
+pub const SMALL_COMET_CLIFF: &[&str] = &[
+    "coarse_graining=960",
+    "material.smallest_diameter=1.5e-3",
+    "material.largest_diameter=3e-3",
+    "shape.width=9",
+    "shape.behind=9",
+    "timestep.safety=1",
+    "standing=300",
+    "output.pictures=1",
+    "packing=small",
+];
+
 /// Settings of the scene `incline` that take a second: 500 grains' mass, 9 of 16 diameters grains in the hybrid.
 pub const SMALL_HYBRID: &[&str] = &[
     "scale=0.85",

@@ -114,7 +114,46 @@ impl CliffScene {
         summary.put("debris_slope", wedge.from(source));
     }
 
-    pub(super) fn put_boulders(&self, ran: &mut Ran, sizes: &Table, summary: &mut Summary) {
+    /// How broken it is: the share of the debris (of what stood before the crack), of contacts that hold, and how far it has
+    /// turned forward (degrees).
+    pub(super) fn put_broken(
+        &self,
+        share: f64,
+        [held, turned]: [f64; 2],
+        record: &CliffRecord,
+        summary: &mut Summary,
+    ) {
+        let mut put = |name: &str, value: f64, unit: &str, source: &str| {
+            summary.put(name, Quantity::new(value, unit).from(source));
+        };
+        put(
+            "debris_share",
+            share,
+            "1",
+            "beyond the foot, at the cliff's solid fraction, over what stood before the crack",
+        );
+        put(
+            "held_contact_share",
+            held,
+            "1",
+            "of the contacts before the crack at the start",
+        );
+        put(
+            "forward_turn",
+            turned,
+            "degrees",
+            "of the sintered part before the crack, forward positive",
+        );
+        put(
+            "solid_fraction",
+            record.heap.solid_fraction,
+            "1",
+            "of the cliff before",
+        );
+    }
+
+    /// Sizes of boulders, and the share of bonds that survive; not a number where there were none.
+    pub(super) fn put_boulders(&self, survive: f64, sizes: &Table, summary: &mut Summary) {
         let diameters = sizes.column("diameter");
         let count = Quantity::new(diameters.len() as f64, "1");
         summary.put(
@@ -134,10 +173,9 @@ impl CliffScene {
                 "observed at Aswan (Pajola et al. 2017); null for fewer than ten boulders",
             ),
         );
-        let bonds = ran.simulation.bond_count();
-        let survive = Quantity::new(1.0 - bonds.broken_share(), "1");
         let source = "of the bonds that the crack left";
-        if bonds.whole + bonds.torn + bonds.sheared > 0 {
+        if survive.is_finite() {
+            let survive = Quantity::new(survive, "1");
             summary.put("bond_survival", self.reference(4, survive, source));
         }
     }

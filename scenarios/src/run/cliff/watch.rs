@@ -124,14 +124,18 @@ impl CliffScene {
         let grains = simulation.grain_list();
         let base = record.heap.solid_fraction * simulation.domain().lengths().y;
         let heights = self.heights(&grains, axis, base);
+        record.see(simulation.time(), axis, heights);
+    }
+}
+
+impl CliffRecord {
+    /// Notes where the debris ends and how high it is, and now and then all heights.
+    pub(super) fn see(&mut self, time: f64, axis: &HeapAxis, heights: Vec<f64>) {
         let front = edge(&axis.positions(), &heights, EDGE * axis.spacing);
-        let (time, highest) = (
-            simulation.time(),
-            heights.iter().copied().fold(0.0, f64::max),
-        );
-        if record.heap.fronts.len().is_multiple_of(PROFILE_EVERY) {
-            record.heap.profiles.push((time, heights));
+        let highest = heights.iter().copied().fold(0.0, f64::max);
+        if self.heap.fronts.len().is_multiple_of(PROFILE_EVERY) {
+            self.heap.profiles.push((time, heights));
         }
-        record.heap.fronts.push([time, front, highest]);
+        self.heap.fronts.push([time, front, highest]);
     }
 }

@@ -1,0 +1,330 @@
+//! The debris of a cliff as a continuum: from the grains it was to its rest.
+//!
+//! The ground is what is left of the cliff, cut along its crack, the wall below it and the plane it stands on.
+
+use crate::failure::Failure;
+use crate::run::bagnold::failure;
+use crate::run::surface_fields::SurfaceFields;
+use crate::scene::CliffScene;
+use crate::vtkhdf::{Cells, Frame};
+use colluvium_continuum::column_collapse::{Collapse, CollapseCase, CollapseGround, Matter};
+use colluvium_continuum::free_surface::{CellFields, SurfaceOptions, SurfaceState};
+use colluvium_continuum::rheology::MuI;
+use colluvium_continuum::terrain::Profile;
+use colluvium_coupling::handover::{Debris, Handed, Room};
+use colluvium_dem::Grain;
+
+/// Least width of a step in the ground over the cliff's height: ground has one height at each place.
+const UPRIGHT: f64 = 1e-3;
+
+/// Debris on the move.
+pub struct Runout {
+    collapse: Collapse,
+    /// The ground in the coordinates of the grains.
+    ground: Profile,
+    /// The grid's x = 0 in the coordinates of the grains (m).
+    low: f64,
+    /// Time of the grains when it began (s).
+    pub begun: f64,
+    /// Width of the slab (m).
+    width: f64,
+    /// How the grains were handed over.
+    pub handed: Handed,
+    /// Steps, Newton iterations, cut steps, cell-steps.
+    pub steps: [u64; 4],
+}
+
+/// Numbers in front of the state.
+const HEAD: usize = 20;
+
+impl Runout {
+    /// What is to run out, of grains of a diameter (m) over their solid fraction; `matter` fills the grid.
+    fn new(
+        scene: &CliffScene,
+        law: MuI,
+        width: f64,
+        matter: impl FnOnce(&Collapse, f64, &Profile) -> Result<(Matter, Handed), Failure>,
+    ) -> Result<Self, Failure> {
+        let d = law.diameter;
+        let axis = scene.heap_axis(d);
+        let (low, height) = (axis.start, scene.shape.height);
+        let length = axis.spacing * axis.columns as f64;
+        let own = scene.left_standing(low + length)?;
+        let shifted = own.points().iter().map(|[x, z]| [x - low, *z]);
+        let ground = CollapseGround {
+            profile: Profile::new(shifted.collect()).map_err(failure)?,
+            contact: scene.runout.contact(),
+        };
+        let case = CollapseCase {
+            aspect: 1.0,
+            height,
+            gravity: scene.gravity,
+            rheology: law,
+            cells: (length / (scene.runout.cell_diameters * d)).round() as usize,
+            length_scaled: length / height,
+            overhang_degrees: 0.0,
+        };
+        let mut handed = Ok(Handed::default());
+        let options = SurfaceOptions::default();
+        let collapse =
+            Collapse::of_matter(&case, &options, &ground, height, |collapse| {
+                match matter(collapse, low, &own) {
+                    Ok((matter, how)) => {
+                        handed = Ok(how);
+                        matter
+                    }
+                    Err(why) => {
+                        handed = Err(why);
+                        let state = collapse.flow().state();
+                        Matter {
+                            fractions: state.fractions.clone(),
+                            velocity: state.velocity.clone(),
+                        }
+                    }
+                }
+            });
+        let handed = handed?;
+        Ok(Self {
+            collapse: collapse.map_err(failure)?,
+            ground: own,
+            low,
+            begun: 0.0,
+            width,
+            handed,
+            steps: [0; 4],
+        })
+    }
+
+    /// Nothing yet, to see whether ground, grid and law fit together.
+    pub fn check(scene: &CliffScene, law: MuI) -> Result<(), Failure> {
+        let nothing = |collapse: &Collapse, _: f64, _: &Profile| {
+            let state = collapse.flow().state();
+            let matter = Matter {
+                fractions: state.fractions.clone(),
+                velocity: state.velocity.clone(),
+            };
+            Ok((matter, Handed::default()))
+        };
+        Self::new(scene, law, 1.0, nothing).map(drop)
+    }
+
+    /// Of grains, in a slab of a width (m), at a time (s).
+    pub fn begin(
+        scene: &CliffScene,
+        law: MuI,
+        width: f64,
+        grains: &[Grain],
+        time: f64,
+    ) -> Result<Self, Failure> {
+        let debris = Debris {
+            grains,
+            solid_fraction: law.solid_fraction,
+            width,
+            reach: scene.runout.reach_diameters * law.diameter,
+        };
+        let mut runout = Self::new(scene, law, width, |collapse, low, ground| {
+            debris
+                .hand_over(&Room::of(collapse, low, ground))
+                .map_err(|why| Failure::Run(why.to_string()))
+        })?;
+        runout.begun = time;
+        Ok(runout)
+    }
+
+    /// Goes on to a time of the grains (s).
+    pub fn go_on(&mut self, time: f64) -> Result<(), Failure> {
+        let until = time - self.begun;
+        while self.collapse.time() < until * (1.0 - 1e-12) {
+            let step = self.collapse.step(until).map_err(failure)?;
+            for (sum, more) in self.steps.iter_mut().zip([
+                1,
+                step.newton_iterations as u64,
+                step.cuts as u64,
+                step.active_cells as u64,
+            ]) {
+                *sum += more;
+            }
+        }
+        Ok(())
+    }
+
+    /// Matter as parcels: place along x (m) and the volume of grains in it (m³).
+    pub fn parcels(&self) -> Vec<[f64; 2]> {
+        let (x, h) = self.collapse.profile();
+        let base = self.collapse.spacing() * self.width * self.law().solid_fraction;
+        x.iter()
+            .zip(h)
+            .map(|(x, h)| [x + self.low, h * base])
+            .collect()
+    }
+
+    /// Mean diameter of the grains that it was (m).
+    pub fn diameter(&self) -> f64 {
+        self.law().diameter
+    }
+
+    /// Mass (kg).
+    pub fn mass(&self) -> f64 {
+        let law = self.law();
+        law.grain_density * law.solid_fraction * self.handed.volume[1]
+    }
+
+    fn law(&self) -> &MuI {
+        self.collapse.rheology()
+    }
+
+    /// Kinetic energy (J).
+    pub fn kinetic(&self) -> f64 {
+        let state = self.collapse.flow().state();
+        let law = self.law();
+        let density = law.grain_density * law.solid_fraction;
+        let cell_mass = density * self.collapse.spacing().powi(2) * self.width;
+        let room = Room::of(&self.collapse, self.low, &self.ground);
+        let [u, w] = &state.velocity;
+        let speed = self.collapse.units().velocity;
+        speed * speed * room.kinetic(&state.fractions, [u, w], cell_mass)
+    }
+
+    /// Volume gained since the hand-over, relative.
+    pub fn volume_drift(&self) -> f64 {
+        let state = self.collapse.flow().state();
+        let area = state.fractions.iter().sum::<f64>() * self.collapse.spacing().powi(2);
+        area * self.width / self.handed.volume[1] - 1.0
+    }
+
+    /// Cells of the grid.
+    pub fn cells(&self) -> u64 {
+        self.collapse.flow().state().fractions.len() as u64
+    }
+
+    /// Cells with matter as quadrilaterals in the plane y = 0, in the coordinates of the grains, at a time (s).
+    pub fn frame(&self, time: f64) -> Frame {
+        let mut cells = self.collapse.fields();
+        for cell in &mut cells {
+            cell.lower[0] += self.low;
+            cell.upper[0] += self.low;
+        }
+        let law = self.law();
+        frame(&cells, law.diameter * law.grain_density.sqrt(), time)
+    }
+
+    /// Appends all that it goes on from.
+    pub fn write(&self, memory: &mut Vec<f64>) {
+        let law = self.law();
+        let state = self.collapse.flow().state();
+        let h = &self.handed;
+        memory.extend([
+            law.diameter,
+            law.grain_density,
+            law.solid_fraction,
+            self.width,
+            self.begun,
+        ]);
+        memory.extend(self.steps.map(|n| n as f64));
+        memory.extend(h.volume);
+        memory.extend(h.momentum.as_flattened());
+        memory.extend(h.kinetic);
+        memory.extend(h.moved);
+        let rows: [&[f64]; 6] = [
+            &state.fractions,
+            &state.velocity[0],
+            &state.velocity[1],
+            &state.pressure,
+            state.stress.as_flattened(),
+            &[
+                state.time,
+                state.velocity_time,
+                state.next_step,
+                state.steps as f64,
+            ],
+        ];
+        for row in rows {
+            memory.push(row.len() as f64);
+            memory.extend(row);
+        }
+    }
+
+    /// Reads it back; none if the numbers are not those of such a scene.
+    pub fn read(scene: &CliffScene, memory: &[f64]) -> Option<Self> {
+        let (head, mut rest) = memory.split_first_chunk::<HEAD>()?;
+        let mut take = || {
+            let (length, after) = rest.split_first()?;
+            let (row, after) = after.split_at_checked(*length as usize)?;
+            rest = after;
+            Some(row.to_vec())
+        };
+        let (fractions, u, w, pressure, stress, times) =
+            (take()?, take()?, take()?, take()?, take()?, take()?);
+        let &[time, velocity_time, next_step, steps] = times.as_slice() else {
+            return None;
+        };
+        let [diameter, grain_density, solid, width, begun, ..] = *head;
+        let law = scene.runout.law(diameter, grain_density, solid);
+        let matter = Matter {
+            fractions: fractions.clone(),
+            velocity: [u.clone(), w.clone()],
+        };
+        let handed = Handed {
+            volume: [head[9], head[10]],
+            momentum: [[head[11], head[12]], [head[13], head[14]]],
+            kinetic: [head[15], head[16], head[17]],
+            moved: [head[18], head[19]],
+        };
+        let mut runout = Self::new(scene, law, width, |_, _, _| Ok((matter, handed))).ok()?;
+        runout
+            .collapse
+            .set_state(SurfaceState {
+                fractions,
+                velocity: [u, w],
+                pressure,
+                stress: stress.as_chunks::<2>().0.to_vec(),
+                time,
+                velocity_time,
+                next_step,
+                steps: steps as usize,
+                ..SurfaceState::default()
+            })
+            .ok()?;
+        runout.begun = begun;
+        runout.steps = std::array::from_fn(|k| head[5 + k] as u64);
+        Some(runout)
+    }
+}
+
+/// Cells as quadrilaterals in the plane y = 0 at a time (s); `inertia` is d √ρ_s.
+fn frame(cells: &[CellFields], inertia: f64, time: f64) -> Frame {
+    let fields = SurfaceFields {
+        cells,
+        inertia,
+        others: 0,
+    };
+    Frame {
+        time,
+        cells: Cells::Quadrilaterals,
+        points: fields.quadrilaterals().collect(),
+        fields: fields.of_plane(),
+    }
+}
+
+/// A continuum that has not begun: no cells.
+pub fn nothing_yet(time: f64) -> Frame {
+    frame(&[], 1.0, time)
+}
+
+impl CliffScene {
+    /// The ground of the run-out, from the back of the cliff to an end (m): what stands behind the crack, the wall below
+    /// it, and the plane.
+    fn left_standing(&self, end: f64) -> Result<Profile, Failure> {
+        let least = UPRIGHT * self.shape.height;
+        let mut points = vec![
+            [self.back() - least, self.shape.height],
+            [-self.crack_head().max(least), self.shape.height],
+            [0.0, self.shape.wall],
+        ];
+        if self.shape.wall > 0.0 {
+            points.push([least, 0.0]);
+        }
+        points.push([end + least, 0.0]);
+        Profile::new(points).map_err(failure)
+    }
+}
