@@ -46,8 +46,9 @@ fn cliff(folder: &Path, name: &str, sets: &[&str]) -> impl Fn(&str) -> f64 + use
     found
 }
 
-/// Parcels of one size and of a third of it: both cliffs stand, fall within minutes, and their debris ends at about the
-/// same place.
+/// Parcels of one size, in five packings, and of a third of it: all cliffs fail within minutes and rest within the hour, and
+/// the fine one ends among the coarse ones. Those differ by more than a factor of two among themselves: some of 250 parcels
+/// do not wait for the crack, and a wedge that slides down stands or tips over.
 #[test]
 #[ignore = "minutes: run by validate.sh"]
 fn parcels_half_a_decade_apart_fall_alike() {
@@ -58,19 +59,56 @@ fn parcels_half_a_decade_apart_fall_alike() {
         "standing=300",
         "duration=3000",
     ];
-    let at = |factor: &str| {
-        let set = format!("coarse_graining={factor}");
-        cliff(folder.path(), factor, &[&room[..], &[&set]].concat())
-    };
-    let (coarse, fine) = (at("600"), at("190"));
-    for found in [&coarse, &fine] {
-        assert_eq!(found("stood"), 1.0);
+    let at = |name: &str, own: [&str; 2]| cliff(folder.path(), name, &[&room[..], &own].concat());
+    let seeds = ["seed=1", "seed=2", "seed=3", "seed=4", "seed=5"];
+    let coarse = seeds.map(|seed| at(seed, ["coarse_graining=600", seed]));
+    let fine = at("fine", ["coarse_graining=190", "seed=1"]);
+    for found in coarse.iter().chain([&fine]) {
         assert!((5.0..600.0).contains(&found("time_of_failure")));
         assert!(found("time_of_rest") < 3000.0);
-        assert!((0.5..1.5).contains(&found("debris_share")));
+        assert!((0.25..1.5).contains(&found("debris_share")));
     }
-    let ratio = coarse("x_front") / fine("x_front");
-    assert!((0.5..2.0).contains(&ratio), "{ratio}");
+    assert_eq!([coarse[0]("stood"), fine("stood")], [1.0; 2]);
+    for name in ["x_front", "time_of_impact", "debris_slope"] {
+        let all = coarse.each_ref().map(|found| found(name));
+        let [low, high] = all
+            .iter()
+            .fold([f64::INFINITY, 0.0_f64], |[a, b], &v| [a.min(v), b.max(v)]);
+        let found = fine(name);
+        assert!(
+            (0.8 * low..1.2 * high).contains(&found),
+            "{name}: {found}, {low} to {high}"
+        );
+    }
+}
+
+/// Debris that becomes a continuum ends where its grains do, for cliffs that its cohesion was not chosen by; without
+/// cohesion their standing wedge runs out.
+#[test]
+#[ignore = "minutes: run by validate.sh"]
+fn debris_of_finer_parcels_ends_where_its_grains_do() {
+    let folder = tempfile::tempdir().unwrap();
+    let room = [
+        "shape.width=11",
+        "shape.behind=11",
+        "standing=300",
+        "duration=3000",
+        "coarse_graining=250",
+    ];
+    let made = folder.path().join("grains/packing.h5");
+    let stored = format!("packing={}", made.display());
+    let grains = cliff(folder.path(), "grains", &room);
+    let hybrid = [&room[..], &["model=hybrid", &stored]].concat();
+    let joined = cliff(folder.path(), "joined", &hybrid);
+    let loose = cliff(
+        folder.path(),
+        "loose",
+        &[&hybrid[..], &["runout.cohesion=0"]].concat(),
+    );
+    let [own, theirs, control] = [&joined, &grains, &loose].map(|found| found("x_front"));
+    println!("front: joined {own:.2} m, grains {theirs:.2} m, without cohesion {control:.2} m");
+    assert!((own / theirs - 1.0).abs() < 0.2, "{own} {theirs}");
+    assert!(control > 1.2 * theirs, "{control} {theirs}");
 }
 
 /// Grains of the paper's size for this overhang, 6 to 12 mm, do not carry the cliff: our material is weaker than theirs. Grains
