@@ -235,38 +235,41 @@ impl<L: ShearLaw + Clone> Collapse<L> {
         })
     }
 
-    /// Matter of any shape, on the move, over ground: what `matter` says of the grid, whose cells reach up to `top`
-    /// (m) at least. Of the case's column only the height is used, as the unit of length.
+    /// Ground without anything on it, to be filled ([`Collapse::fill`]); cells reach up to `top` (m) at least. Of the case's
+    /// column only the height is used, as the unit of length.
     ///
     /// # Errors
-    /// Parameters or settings out of range, ground that does not span the grid, or [`Error::ForeignState`] for matter
-    /// of another grid.
-    pub fn of_matter(
+    /// Parameters or settings out of range, or ground that does not span the grid.
+    pub fn bare(
         case: &CollapseCase<L>,
         options: &SurfaceOptions,
         ground: &CollapseGround,
         top: f64,
-        matter: impl FnOnce(&Self) -> Matter,
     ) -> Result<Self, Error> {
         case.validate()?;
         let (flow, bottom) = case.bare(ground, top, options)?;
-        let mut collapse = Self {
+        Ok(Self {
             bottom,
             ground: Some(ground.clone()),
             ..Self::of_flow(case, options, flow)
-        };
-        let Matter {
-            fractions,
-            velocity,
-        } = matter(&collapse);
-        let unit = collapse.units.velocity;
-        collapse.flow.set_state(SurfaceState {
-            fractions,
-            velocity: velocity.map(|u| u.into_iter().map(|u| u / unit).collect()),
-            ..collapse.flow.state().clone()
+        })
+    }
+
+    /// Puts matter of any shape, at rest or on the move, in the place of what there is.
+    ///
+    /// # Errors
+    /// [`Error::ForeignState`] for matter of another grid.
+    pub fn fill(&mut self, matter: Matter) -> Result<(), Error> {
+        let unit = self.units.velocity;
+        self.flow.set_state(SurfaceState {
+            fractions: matter.fractions,
+            velocity: matter
+                .velocity
+                .map(|u| u.into_iter().map(|u| u / unit).collect()),
+            ..self.flow.state().clone()
         })?;
-        collapse.start_volume = collapse.flow.volume();
-        Ok(collapse)
+        self.start_volume = self.flow.volume();
+        Ok(())
     }
 
     /// Lower corner of the grid (m).

@@ -5,6 +5,9 @@
 //! changes hands as a whole (`coupling::handover`); the grains behind are held from then on. The continuum runs out over
 //! what is left of the cliff (`runout.rs`) until it rests.
 
+mod broken;
+mod findings;
+
 use super::record::CliffRecord;
 use super::runout::{Runout, nothing_yet};
 use super::{STILL, STILL_LOOKS, bonds_that_survive, comet};
@@ -13,10 +16,10 @@ use crate::run::world::boulders::boulders;
 use crate::run::world::{Course, Expected, Ran, Recipe, as_the_scene, fragments};
 use crate::scene::CliffScene;
 use crate::scene::world::Materials;
-use crate::state_hash;
-use crate::summary::{Figure, Quantity, Summary};
+use crate::summary::Summary;
 use crate::table::Table;
 use crate::vtkhdf::Frame;
+use broken::Broken;
 use colluvium_dem::{Grain, Simulation, Snapshot};
 use std::collections::BTreeSet;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -38,50 +41,6 @@ impl std::fmt::Debug for JoinedCliff<'_> {
 struct Live {
     broken: Broken,
     runout: Runout,
-}
-
-/// How broken the cliff was at the hand-over: what a continuum cannot tell.
-#[derive(Clone, Debug, Default, PartialEq)]
-struct Broken {
-    /// Steps made, and grains handed over.
-    counts: [f64; 2],
-    /// Share of the contacts before the crack that still held.
-    held: f64,
-    /// How far the sintered part had turned forward (degrees).
-    turned: f64,
-    /// Share of the bonds that the crack left that were whole; not a number where there were none.
-    bonds: f64,
-    /// Columns of the boulders' table.
-    boulders: Vec<Vec<f64>>,
-}
-
-impl Broken {
-    fn write(&self, memory: &mut Vec<f64>) {
-        memory.extend(self.counts);
-        memory.extend([self.held, self.turned, self.bonds]);
-        let rows = self.boulders.first().map_or(0, Vec::len);
-        memory.extend([self.boulders.len() as f64, rows as f64]);
-        memory.extend(self.boulders.iter().flatten());
-    }
-
-    /// Reads it from the front of a memory, and says what follows.
-    fn read(memory: &[f64]) -> Option<(Broken, &[f64])> {
-        let (&[steps, grains, held, turned, bonds, columns, rows], rest) =
-            memory.split_first_chunk::<7>()?;
-        let (columns, rows) = (columns as usize, rows as usize);
-        let (numbers, rest) = rest.split_at_checked(columns * rows)?;
-        let boulders = (0..columns).map(|c| numbers[c * rows..(c + 1) * rows].to_vec());
-        Some((
-            Broken {
-                counts: [steps, grains],
-                held,
-                turned,
-                bonds,
-                boulders: boulders.collect(),
-            },
-            rest,
-        ))
-    }
 }
 
 impl<'a> JoinedCliff<'a> {
@@ -354,127 +313,5 @@ impl Recipe for JoinedCliff<'_> {
             return self.scene.conclude(ran, summary);
         };
         self.find(live, &memory, ran, summary)
-    }
-}
-
-impl JoinedCliff<'_> {
-    /// What the run has come to, with a continuum at its end.
-    fn find(
-        &self,
-        live: &Live,
-        memory: &[f64],
-        ran: &mut Ran,
-        summary: &mut Summary,
-    ) -> Result<Vec<Table>, Failure> {
-        let Live { broken, runout } = live;
-        let none = || Failure::Run("the cliff was never looked at".into());
-        let axis = self.scene.heap_axis(runout.diameter());
-        let record = CliffRecord::read(memory, axis.columns).ok_or_else(none)?;
-        let deposit = self.heights(&mut ran.simulation, live, record.heap.solid_fraction);
-        let places = axis.positions();
-        self.scene.put_times(&record, ran, summary);
-        self.scene
-            .put_pile(&places, &deposit, runout.diameter(), summary);
-        let across = ran.simulation.domain().lengths().y;
-        let beyond = runout.parcels().into_iter().filter(|[x, _]| *x > 0.0);
-        let beyond: f64 = beyond.map(|[_, volume]| volume).sum();
-        let share = beyond / (record.heap.solid_fraction * across * self.scene.areas()[1]);
-        // The columns' names are those of any boulders.
-        let mut sizes = boulders(
-            &ran.simulation.clusters(),
-            self.scene.material.solid_fraction(),
-        );
-        for (column, values) in sizes.columns.iter_mut().zip(&broken.boulders) {
-            column.values.clone_from(values);
-        }
-        let broken_at = [broken.held, broken.turned];
-        self.scene.put_broken(share, broken_at, &record, summary);
-        self.scene.put_boulders(broken.bonds, &sizes, summary);
-        summary.remarks.push(format!(
-            "Its grains became a continuum {:.0} s after the start; contacts, turn, bonds and boulders are those of then.",
-            runout.begun
-        ));
-        self.book(live, ran, summary);
-        summary.figures.push(Figure::history(
-            "kinetic energy [J]",
-            &[
-                ("translation", "grains, translation"),
-                ("rotation", "grains, rotation"),
-                ("continuum_kinetic", "continuum"),
-            ],
-            "The fall and the run-out: kinetic energy of grains and continuum in time.",
-        ));
-        summary.figures.push(Figure::history(
-            "length [m]",
-            &[("sunk", "sunk on the mean"), ("x_front", "front")],
-            "How far what stood before the crack has sunk while it was grains, and where the debris ends.",
-        ));
-        let mut tables = record.heap.tables(places, deposit);
-        tables.push(sizes);
-        Ok(tables)
-    }
-
-    /// The hand-over, cost, and the ledger.
-    fn book(&self, live: &Live, ran: &mut Ran, summary: &mut Summary) {
-        let Live { broken, runout } = live;
-        let grains = ran.packing.grains.len() as f64;
-        let [steps, handed_over] = broken.counts;
-        // Grains that are held cost nothing that counts as a grain-step.
-        let counted = ran.simulation.steps_done() as f64 * grains;
-        let spared = counted - steps * grains;
-        summary.cost.grain_steps -= (spared as u64).min(summary.cost.grain_steps);
-        let [made, iterations, cuts, cell_steps] = runout.steps;
-        summary.cost.cell_steps = cell_steps;
-        if summary.cost.wall_s > 0.0 {
-            summary.cost.grain_steps_per_s = summary.cost.grain_steps as f64 / summary.cost.wall_s;
-            summary.cost.cell_steps_per_s = cell_steps as f64 / summary.cost.wall_s;
-        }
-        summary.model.cells = runout.cells();
-        let h = &runout.handed;
-        summary.ledger.mass_relative = runout.volume_drift();
-        let scale = (2.0 * h.kinetic[0] * runout.mass()).sqrt();
-        let off = (0..2).map(|c| (h.momentum[1][c] - h.momentum[0][c]).abs());
-        let off = off.fold(0.0, f64::max) / scale;
-        let mut put = |name: &str, value: f64, unit: &str, source: &str| {
-            summary.put(name, Quantity::new(value, unit).from(source));
-        };
-        put(
-            "time_of_handover",
-            runout.begun,
-            "s",
-            "when the grains became a continuum, from the start of the run",
-        );
-        put("handed_grains", handed_over, "1", "that became a continuum");
-        put(
-            "handed_volume_error",
-            h.volume[1] / h.volume[0] - 1.0,
-            "1",
-            "volume of the continuum over that of the grains at the cliff's solid fraction, less 1",
-        );
-        put(
-            "handed_momentum_error",
-            off,
-            "1",
-            "over √(2 mass × kinetic energy)",
-        );
-        put(
-            "handed_kinetic_share",
-            h.kinetic[2] / (h.kinetic[0] + h.kinetic[1]),
-            "1",
-            "kinetic energy of the continuum over that of its grains: spin and agitation about the mean are left",
-        );
-        put("continuum_steps", made as f64, "1", "");
-        put(
-            "newton_iterations",
-            iterations as f64,
-            "1",
-            "failed attempts included",
-        );
-        put("steps_cut", cuts as f64, "1", "halved and tried again");
-        summary.state_hash = state_hash::of_hashes(
-            [ran.simulation.state_hash(), state_hash::of(&[&ran.state])]
-                .iter()
-                .map(String::as_str),
-        );
     }
 }

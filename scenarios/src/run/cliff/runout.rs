@@ -7,7 +7,7 @@ use crate::run::bagnold::failure;
 use crate::run::surface_fields::SurfaceFields;
 use crate::scene::CliffScene;
 use crate::vtkhdf::{Cells, Frame};
-use colluvium_continuum::column_collapse::{Collapse, CollapseCase, CollapseGround, Matter};
+use colluvium_continuum::column_collapse::{Collapse, CollapseCase, CollapseGround};
 use colluvium_continuum::free_surface::{CellFields, SurfaceOptions, SurfaceState};
 use colluvium_continuum::rheology::MuI;
 use colluvium_continuum::terrain::Profile;
@@ -34,17 +34,13 @@ pub struct Runout {
     pub steps: [u64; 4],
 }
 
-/// Numbers in front of the state.
+/// Numbers in front of the state: the law's diameter, density and solid fraction, the width, the time of the hand-over, four
+/// counts of steps, and how the hand-over went.
 const HEAD: usize = 20;
 
 impl Runout {
-    /// What is to run out, of grains of a diameter (m) over their solid fraction; `matter` fills the grid.
-    fn new(
-        scene: &CliffScene,
-        law: MuI,
-        width: f64,
-        matter: impl FnOnce(&Collapse, f64, &Profile) -> Result<(Matter, Handed), Failure>,
-    ) -> Result<Self, Failure> {
+    /// Ground and grid, with nothing on it yet, in a slab of a width (m).
+    fn bare(scene: &CliffScene, law: MuI, width: f64) -> Result<Self, Failure> {
         let d = law.diameter;
         let axis = scene.heap_axis(d);
         let (low, height) = (axis.start, scene.shape.height);
@@ -64,48 +60,22 @@ impl Runout {
             length_scaled: length / height,
             overhang_degrees: 0.0,
         };
-        let mut handed = Ok(Handed::default());
         let options = SurfaceOptions::default();
-        let collapse =
-            Collapse::of_matter(&case, &options, &ground, height, |collapse| {
-                match matter(collapse, low, &own) {
-                    Ok((matter, how)) => {
-                        handed = Ok(how);
-                        matter
-                    }
-                    Err(why) => {
-                        handed = Err(why);
-                        let state = collapse.flow().state();
-                        Matter {
-                            fractions: state.fractions.clone(),
-                            velocity: state.velocity.clone(),
-                        }
-                    }
-                }
-            });
-        let handed = handed?;
+        let collapse = Collapse::bare(&case, &options, &ground, height).map_err(failure)?;
         Ok(Self {
-            collapse: collapse.map_err(failure)?,
+            collapse,
             ground: own,
             low,
             begun: 0.0,
             width,
-            handed,
+            handed: Handed::default(),
             steps: [0; 4],
         })
     }
 
-    /// Nothing yet, to see whether ground, grid and law fit together.
+    /// Whether ground, grid and law fit together.
     pub fn check(scene: &CliffScene, law: MuI) -> Result<(), Failure> {
-        let nothing = |collapse: &Collapse, _: f64, _: &Profile| {
-            let state = collapse.flow().state();
-            let matter = Matter {
-                fractions: state.fractions.clone(),
-                velocity: state.velocity.clone(),
-            };
-            Ok((matter, Handed::default()))
-        };
-        Self::new(scene, law, 1.0, nothing).map(drop)
+        Self::bare(scene, law, 1.0).map(drop)
     }
 
     /// Of grains, in a slab of a width (m), at a time (s).
@@ -116,19 +86,24 @@ impl Runout {
         grains: &[Grain],
         time: f64,
     ) -> Result<Self, Failure> {
+        let mut runout = Self::bare(scene, law, width)?;
         let debris = Debris {
             grains,
             solid_fraction: law.solid_fraction,
             width,
             reach: scene.runout.reach_diameters * law.diameter,
         };
-        let mut runout = Self::new(scene, law, width, |collapse, low, ground| {
-            debris
-                .hand_over(&Room::of(collapse, low, ground))
-                .map_err(|why| Failure::Run(why.to_string()))
-        })?;
+        let (matter, handed) = debris
+            .hand_over(&runout.room())
+            .map_err(|why| Failure::Run(why.to_string()))?;
+        runout.collapse.fill(matter).map_err(failure)?;
+        runout.handed = handed;
         runout.begun = time;
         Ok(runout)
+    }
+
+    fn room(&self) -> Room<'_> {
+        Room::of(&self.collapse, self.low, &self.ground)
     }
 
     /// Goes on to a time of the grains (s).
@@ -179,10 +154,9 @@ impl Runout {
         let law = self.law();
         let density = law.grain_density * law.solid_fraction;
         let cell_mass = density * self.collapse.spacing().powi(2) * self.width;
-        let room = Room::of(&self.collapse, self.low, &self.ground);
         let [u, w] = &state.velocity;
         let speed = self.collapse.units().velocity;
-        speed * speed * room.kinetic(&state.fractions, [u, w], cell_mass)
+        speed * speed * self.room().kinetic(&state.fractions, [u, w], cell_mass)
     }
 
     /// Volume gained since the hand-over, relative.
@@ -260,17 +234,13 @@ impl Runout {
         };
         let [diameter, grain_density, solid, width, begun, ..] = *head;
         let law = scene.runout.law(diameter, grain_density, solid);
-        let matter = Matter {
-            fractions: fractions.clone(),
-            velocity: [u.clone(), w.clone()],
-        };
-        let handed = Handed {
+        let mut runout = Self::bare(scene, law, width).ok()?;
+        runout.handed = Handed {
             volume: [head[9], head[10]],
             momentum: [[head[11], head[12]], [head[13], head[14]]],
             kinetic: [head[15], head[16], head[17]],
             moved: [head[18], head[19]],
         };
-        let mut runout = Self::new(scene, law, width, |_, _, _| Ok((matter, handed))).ok()?;
         runout
             .collapse
             .set_state(SurfaceState {
