@@ -299,7 +299,13 @@ impl Debris<'_> {
                 .map(|face| unit * room.carried(c, face, fractions))
                 .collect();
             let sum = |u: &[f64]| loads.iter().zip(u).map(|(m, u)| m * u).sum::<f64>();
-            let moved = (grains - sum(velocity)) / loads.iter().sum::<f64>();
+            let carried: f64 = loads.iter().sum();
+            // Matter of a single cell has no face of its own along an axis.
+            let moved = if carried > 0.0 {
+                (grains - sum(velocity)) / carried
+            } else {
+                0.0
+            };
             for (u, load) in velocity.iter_mut().zip(&loads) {
                 *u += if *load > 0.0 { moved } else { 0.0 };
             }
