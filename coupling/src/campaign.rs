@@ -16,9 +16,9 @@ pub use verdict::Verdict;
 
 use crate::calibration::thesis::{EstimatorFit, VelocityProfile, estimator_fits};
 use crate::calibration::{
-    Alternative, BulkFlow, FluidityFit, FreeForm, LeftOut, LocalPoint, MuIFit, Posterior,
-    ResidualTests, Stress, compare_laws, fit_free_form, fit_mu_i, left_out, pressure_ratio,
-    residual_tests, sample_posterior,
+    Alternative, BulkFlow, FluidityFit, FreeForm, JointComparison, LeftOut, LocalPoint, MuIFit,
+    Posterior, ResidualTests, Stress, compare_joint_laws, compare_laws, fit_free_form, fit_mu_i,
+    left_out, pressure_ratio, residual_tests, sample_posterior,
 };
 use crate::incline::{Cost, InclineResult, InclineRun, InclineSpec, Purpose, Start};
 use rayon::prelude::*;
@@ -95,6 +95,9 @@ pub struct CampaignResult {
     /// Competing laws of |τ|/p, the best supported first.
     #[serde(default)]
     pub alternatives: Vec<Alternative>,
+    /// Laws of |τ|/p and φ together: one φ, φ(I), φ(I) and dilatancy.
+    #[serde(default)]
+    pub joint: Option<JointComparison>,
     /// Non-local fluidity against the local law, on the profiles through the depth.
     #[serde(default)]
     pub fluidity: Option<FluidityFit>,
@@ -252,6 +255,7 @@ pub fn evaluate(
     let fit_zz = fits[1].as_ref().ok();
     let posterior_zz = fit_zz.and_then(|fit| sample_posterior(&points, fit, spec.seed));
     let alternatives = compare_laws(&points, mean_pressure).unwrap_or_default();
+    let joint = compare_joint_laws(&points, mean_pressure).ok();
     let knots = (points.len() / 8).clamp(4, 12);
     let free_form = fit_free_form(&points, mean_pressure, knots, true).ok();
     let mut cost = Cost::default();
@@ -285,6 +289,7 @@ pub fn evaluate(
         non_local: &non_local,
         residuals: &residuals,
         alternatives: &alternatives,
+        joint: &joint,
         posterior: &posterior,
         points: &points,
         candidates: candidates::Candidates {
@@ -319,6 +324,7 @@ pub fn evaluate(
         non_local,
         residuals,
         alternatives,
+        joint,
         fluidity,
         free_form,
         posterior,

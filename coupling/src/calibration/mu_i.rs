@@ -98,7 +98,7 @@ fn gradient(p: &Vector3<f64>, i: f64) -> Vector3<f64> {
 }
 
 /// ∂μ/∂I.
-fn slope(p: &Vector3<f64>, i: f64) -> f64 {
+pub(super) fn slope(p: &Vector3<f64>, i: f64) -> f64 {
     (p[1] - p[0]) * p[2] / ((i + p[2]) * (i + p[2]))
 }
 
