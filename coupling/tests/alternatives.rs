@@ -45,22 +45,21 @@ fn credible_intervals_cover_the_truth_at_their_rate() {
     let mut rng = ChaCha8Rng::seed_from_u64(21);
     let draws = 200;
     let (mut narrow, mut wide) = ([0.0; 3], [0.0; 3]);
+    let mut mixing = [1.0, 1000.0f64];
     for seed in 0..draws {
         let points = draw(&mut rng, &jop, 0.003, 0.006);
         let fit = fit_mu_i(&points, Stress::MeanPressure).unwrap();
         let posterior = sample_posterior(&points, &fit, seed).unwrap();
-        assert!(
-            (0.1..0.7).contains(&posterior.acceptance),
-            "{}",
-            posterior.acceptance
-        );
+        mixing[0] = mixing[0].min(posterior.acceptance);
+        mixing[1] = mixing[1].min(posterior.effective_samples);
         for k in 0..3 {
             let [a, b, _, c, d] = posterior.quantiles[k];
             narrow[k] += f64::from(u8::from((b..c).contains(&TRUTH[k]))) / draws as f64;
             wide[k] += f64::from(u8::from((a..d).contains(&TRUTH[k]))) / draws as f64;
         }
     }
-    println!("68 % intervals cover {narrow:.3?}, 95 % intervals {wide:.3?}");
+    println!("68 % intervals cover {narrow:.3?}, 95 % intervals {wide:.3?}; at least {mixing:.3?} taken, independent");
+    assert!(mixing[0] > 0.3 && mixing[1] > 400.0, "{mixing:?}");
     // Eight runs tell the scatter between runs to a quarter: Student's tails, and a floor of 1 on the scale.
     assert!(
         narrow.iter().all(|c| (0.56..0.82).contains(c)),
@@ -77,7 +76,7 @@ fn the_same_seed_gives_the_same_samples() {
     assert_eq!(first, sample_posterior(&points, &fit, 7).unwrap());
     assert_ne!(first, sample_posterior(&points, &fit, 8).unwrap());
     assert!(
-        first.effective_samples > 200.0,
+        first.effective_samples > 600.0,
         "{}",
         first.effective_samples
     );
