@@ -17,7 +17,7 @@ use rand::{Rng, RngExt};
 use rand_distr::StandardNormal;
 
 /// Cells of ln I_0.
-const CELLS: usize = 240;
+const CELLS: usize = 960;
 /// Standard deviations of the proposals over those of the cells.
 const WIDER: f64 = 1.15;
 /// Share of the proposals that may be in any cell.
