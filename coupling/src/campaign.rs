@@ -9,8 +9,11 @@ mod search;
 mod threshold;
 mod verdict;
 
-pub use design::{Precision, Prospect, choose_slopes, prospect};
-pub use plan::{Bracket, CampaignError, CampaignSpec, GuessedLaw, OtherBed};
+pub use design::{
+    Depths, Flow, Precision, Prospect, choose_flows, choose_slopes, cost, prospect,
+    prospect_of_flows,
+};
+pub use plan::{Bracket, CampaignError, CampaignSpec, FlowsOfDepth, GuessedLaw, OtherBed};
 pub use threshold::{NonLocal, Threshold, Trial, non_local_length, threshold};
 pub use verdict::Verdict;
 
@@ -56,7 +59,7 @@ pub enum CampaignEvent<'a> {
 /// Result of a campaign.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CampaignResult {
-    /// All runs: measured flows by rising slope, then the search for the stop, then for the onset, then those of other
+    /// All runs: measured flows by rising slope, then those of other depths, then the search for the stop, then for the onset, then those of other
     /// depths for the stop.
     pub runs: Vec<InclineResult>,
     /// Lowest slope where a flow goes on, and the highest below it where one stops (degrees).
@@ -158,6 +161,8 @@ pub fn run_campaign(
         tasks.extend(spec.depth_beds().map(Task::Depth));
     }
     let searches = tasks.len();
+    let elsewhere = spec.flows_elsewhere().into_iter().rev();
+    tasks.extend(elsewhere.map(|(angle, bed)| Task::Flow(angle, bed)));
     let angles = spec.sorted_flow_angles().into_iter().rev();
     let flow_beds = spec.full_beds().take(spec.flow_beds.max(1)).rev();
     tasks.extend(angles.flat_map(|angle| flow_beds.clone().map(move |bed| Task::Flow(angle, bed))));
@@ -229,11 +234,16 @@ pub fn evaluate(
     .map(|stress| fit_mu_i(&points, stress));
     let estimators = estimator_fits(&profiles);
     // A flow that was to be measured and stopped, or went on, tells about the stop as well.
-    let stop = bracket(stop_runs.iter().chain(&flows));
+    let full = |r: &&InclineResult| spec.full_beds().contains(&(r.bed as usize));
+    let stop = bracket(stop_runs.iter().chain(flows.iter().filter(full)));
     let onset = bracket(onset_runs.iter());
     // Where half of the beds stop: by all runs of that depth that started from flow.
     let outcome = |r: &InclineResult| (r.slope_degrees, r.flows());
-    let full_stops: Vec<(f64, bool)> = stop_runs.iter().chain(&flows).map(outcome).collect();
+    let full_stops: Vec<(f64, bool)> = stop_runs
+        .iter()
+        .chain(flows.iter().filter(full))
+        .map(outcome)
+        .collect();
     let height = spec.base.bed_height();
     let stop_threshold = threshold(&full_stops, height);
     let onset_threshold = threshold(&onset_runs.iter().map(outcome).collect::<Vec<_>>(), height);

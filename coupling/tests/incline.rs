@@ -281,6 +281,7 @@ fn tiny_campaign() -> CampaignSpec {
         base,
         published_material: Some("moderate".into()),
         flow_angles_degrees: vec![37.0, 31.0, 33.0, 35.0],
+        flows_of_depth: Vec::new(),
         guessed_law: GuessedLaw {
             mu_s: 0.45,
             mu_2: 0.95,
