@@ -113,7 +113,7 @@ fn samples_are_those_of_the_posterior() {
                         -0.5 * (miss * miss / variance + (variance / 1.6e-5).ln())
                     });
                     let log = log.sum::<f64>() / fit.error_scale.powi(2);
-                    sum += (log + 0.5 * fit.chi_square).exp() / (b - a);
+                    sum += (log + 0.5 * fit.chi_square).exp();
                 }
             }
             density.push((i_0, sum));

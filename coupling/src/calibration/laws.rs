@@ -151,6 +151,19 @@ fn fit_law(law: Law, data: &[(f64, f64, f64)]) -> Result<Fitted, FitError> {
     }
 }
 
+/// QAICc of χ²/ĉ with k parameters and n effective points.
+fn criterion(chi_square: f64, k: f64, n: f64) -> f64 {
+    chi_square + 2.0 * k + 2.0 * k * (k + 1.0) / (n - k - 1.0).max(1.0)
+}
+
+/// Akaike weights of criteria of which the first is the least.
+fn weights(criteria: &[f64]) -> Vec<f64> {
+    let best = criteria.first().copied().unwrap_or(0.0);
+    let likelihood = |c: &f64| (-0.5 * (c - best)).exp();
+    let sum: f64 = criteria.iter().map(likelihood).sum();
+    criteria.iter().map(|c| likelihood(c) / sum).collect()
+}
+
 /// Σ_runs m ē²/(runs − `parameters`) for runs of m points whose normalised residuals have the mean ē; 0 where runs are too few.
 fn between_runs(normalised: &[f64], by_run: &[usize], parameters: usize) -> f64 {
     let runs = by_run.iter().max().map_or(0, |m| m + 1);
@@ -197,7 +210,6 @@ pub fn compare_laws(points: &[LocalPoint], stress: Stress) -> Result<Vec<Alterna
         .into_iter()
         .map(|(law, fit)| {
             let k = fit.parameters.len() as f64;
-            let few = (effective - k - 1.0).max(1.0);
             let squares: f64 = data
                 .iter()
                 .map(|point| residual(law, &fit.parameters, point).powi(2))
@@ -208,18 +220,16 @@ pub fn compare_laws(points: &[LocalPoint], stress: Stress) -> Result<Vec<Alterna
                 errors: fit.variances.iter().map(|v| (v * own).sqrt()).collect(),
                 chi_square: fit.chi_square,
                 rms_residual: (squares / data.len() as f64).sqrt(),
-                criterion: fit.chi_square / scatter + 2.0 * k + 2.0 * k * (k + 1.0) / few,
+                criterion: criterion(fit.chi_square / scatter, k, effective),
                 weight: 0.0,
                 parameters: fit.parameters,
             }
         })
         .collect();
     list.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
-    let best = list[0].criterion;
-    let likelihood = |a: &Alternative| (-0.5 * (a.criterion - best)).exp();
-    let sum: f64 = list.iter().map(likelihood).sum();
-    for alternative in &mut list {
-        alternative.weight = likelihood(alternative) / sum;
+    let criteria: Vec<f64> = list.iter().map(|a| a.criterion).collect();
+    for (alternative, weight) in list.iter_mut().zip(weights(&criteria)) {
+        alternative.weight = weight;
     }
     Ok(list)
 }

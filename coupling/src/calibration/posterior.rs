@@ -2,13 +2,15 @@
 //!
 //! Likelihood: Gauss' in μ with the effective variance σ² = σ_μ² + (∂μ/∂I)² σ_I² of each point, which depends on the
 //! parameters, all of it over the square of the fit's `error_scale` (layers of a run are not independent). Prior: flat
-//! in μ_s ≥ 0, μ_2 > μ_s and ln I_0, the last within a factor of 100 beyond the range of I of the data: what the data
-//! do not say stays bounded, and is seen to be only that.
+//! in μ_a and μ_b, the friction at the two ends of the data, and in ln I_0, where μ_s ≥ 0 and μ_2 > μ_s, I_0 within a factor of
+//! 100 beyond the range of I of the data: what the data do not say stays bounded, and is seen to be only that. (Flat in
+//! μ_2 − μ_s instead, laws that are straight through the data would weigh as I_0, and its bound would say what comes out.)
 //!
 //! μ_2 and I_0 lie along a bent valley, which a random walk follows slowly. So the valley is laid out first ([`Valley`]) and
 //! whole samples are proposed from it and taken by the rule of Metropolis and Hastings for proposals that do not depend on
 //! where the chain is (Tierney 1994), the random numbers seeded. Where the scale of the errors is known from ν degrees of
-//! freedom only, each sample is moved away from the median by √(ν/χ²), χ² drawn with ν degrees: Student's tails.
+//! freedom only, each sample is moved away from the median of (μ_a, μ_b, ln I_0), along the valley, by √(ν/χ²), χ² drawn with ν
+//! degrees: Student's tails.
 
 mod valley;
 
@@ -45,11 +47,16 @@ const BURN_IN: usize = 100;
 /// How far I_0 may lie outside the data, as a factor.
 const BEYOND_DATA: f64 = 100.0;
 
-/// The law as the chain sees it: μ_s, μ_2 − μ_s and ln I_0.
+/// The law as the chain sees it: friction at the two ends of the data, and ln I_0.
 type Walker = Vector3<f64>;
 
-fn law(w: &Walker) -> [f64; 3] {
-    [w[0], w[0] + w[1], w[2].exp()]
+/// (μ_s, μ_2, I_0) for the ends of the data.
+fn law(w: &Walker, ends: [f64; 2]) -> [f64; 3] {
+    let i_0 = w[2].exp();
+    let [a, b] = ends.map(|i| i / (i + i_0));
+    let span = (w[1] - w[0]) / (b - a);
+    let mu_s = w[0] - span * a;
+    [mu_s, mu_s + span, i_0]
 }
 
 /// Samples the posterior of a fit from the points it was made from; the same seed gives the same samples.
@@ -70,15 +77,14 @@ pub fn sample_posterior(points: &[LocalPoint], fit: &MuIFit, seed: u64) -> Optio
     });
     let narrowed = fit.error_scale / student.map_or(1.0, |(_, quantile)| quantile);
     let temperature = narrowed * narrowed;
-    let limits = [
-        (fit.valid_i[0] / BEYOND_DATA).ln(),
-        (fit.valid_i[1] * BEYOND_DATA).ln(),
-    ];
+    let ends = fit.valid_i;
+    let limits = [(ends[0] / BEYOND_DATA).ln(), (ends[1] * BEYOND_DATA).ln()];
     let log_posterior = |w: &Walker| {
-        if w[0] < 0.0 || w[1] <= 0.0 || w[2] < limits[0] || w[2] > limits[1] {
+        let [mu_s, mu_2, i_0] = law(w, ends);
+        let allowed = mu_s >= 0.0 && mu_2 > mu_s && (limits[0]..=limits[1]).contains(&w[2]);
+        if !allowed {
             return f64::NEG_INFINITY;
         }
-        let [mu_s, mu_2, i_0] = law(w);
         let mut sum = 0.0;
         for p in points {
             let (mu, error) = friction(p);
@@ -101,11 +107,8 @@ pub fn sample_posterior(points: &[LocalPoint], fit: &MuIFit, seed: u64) -> Optio
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
     // Height above the proposals: what the chain is to be moved by.
     let above = |w: &Walker| log_posterior(w) - valley.log_density(w);
-    let mut here = Vector3::new(
-        fit.mu_s,
-        fit.mu_2 - fit.mu_s,
-        fit.i_0.ln().clamp(limits[0], limits[1]),
-    );
+    let [mu_a, mu_b] = ends.map(|i| mu_of_i(fit.mu_s, fit.mu_2, fit.i_0, i));
+    let mut here = Vector3::new(mu_a, mu_b, fit.i_0.ln().clamp(limits[0], limits[1]));
     let mut height = above(&here);
     let mut samples = Vec::with_capacity(KEPT);
     let (mut taken, steps) = (0usize, BURN_IN + KEPT * THINNING);
@@ -137,7 +140,7 @@ pub fn sample_posterior(points: &[LocalPoint], fit: &MuIFit, seed: u64) -> Optio
             }
         }
     }
-    let samples: Vec<[f64; 3]> = samples.iter().map(law).collect();
+    let samples: Vec<[f64; 3]> = samples.iter().map(|w| law(w, ends)).collect();
     Some(Posterior {
         quantiles: std::array::from_fn(|k| QUANTILES.map(|q| quantile(&samples, |s| s[k], q))),
         samples,

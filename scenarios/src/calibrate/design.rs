@@ -54,7 +54,8 @@ pub fn flows(body: &InclineScene) -> Vec<Flow> {
     } else if keys.depth_choices.is_empty() {
         choose_slopes(&law, &precision, range(body, &law), count, APART)
     } else {
-        let range = range(body, &law);
+        // Whole quarters of a degree, as all others are.
+        let range = range(body, &law).map(|end| (4.0 * end).floor() / 4.0);
         return choose_flows(&law, &precision, &depths(body), range, count, APART);
     };
     let full = |slope_degrees: f64| Flow {

@@ -19,9 +19,11 @@
 //! number of points over ĉ, at least the number of flows.
 
 use super::deviation::{Deviation, shares};
-use super::{Law, between_runs, fit_law};
+use super::{Law, between_runs, criterion, fit_law, weights};
 use crate::calibration::least_squares::{FitError, levenberg_marquardt, minimise};
-use crate::calibration::mu_i::{Stress, checked_points, run_numbers, slope, solve};
+use crate::calibration::mu_i::{
+    LEAST_FRACTION_ERROR, Stress, checked_points, run_numbers, slope, solve,
+};
 use crate::calibration::points::LocalPoint;
 use nalgebra::{DMatrix, DVector, SVector};
 use serde::{Deserialize, Serialize};
@@ -93,9 +95,6 @@ impl JointComparison {
     }
 }
 
-/// Least error of φ: slices of a dense bed fluctuate so little that counting errors alone would weigh absurdly.
-const LEAST_FRACTION_ERROR: f64 = 1e-4;
-
 /// One half of a candidate.
 struct Half {
     parameters: Vec<f64>,
@@ -105,12 +104,11 @@ struct Half {
 }
 
 impl Half {
-    /// QAICc, with `count` parameters, for the scatter ĉ.
+    /// QAICc for the scatter ĉ.
     fn criterion(&self, scatter: f64, runs: usize) -> f64 {
         let k = self.parameters.len() as f64;
         let effective = (self.normalised.len() as f64 / scatter).max(runs as f64);
-        let few = (effective - k - 1.0).max(1.0);
-        self.chi_square / scatter + 2.0 * k + 2.0 * k * (k + 1.0) / few
+        criterion(self.chi_square / scatter, k, effective)
     }
 
     /// ĉ, were this the richest candidate.
@@ -300,11 +298,9 @@ pub fn compare_joint_laws(
         }
     }
     alternatives.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
-    let best = alternatives[0].criterion;
-    let likelihood = |a: &JointAlternative| (-0.5 * (a.criterion - best)).exp();
-    let sum: f64 = alternatives.iter().map(likelihood).sum();
-    for alternative in &mut alternatives {
-        alternative.weight = likelihood(alternative) / sum;
+    let criteria: Vec<f64> = alternatives.iter().map(|a| a.criterion).collect();
+    for (alternative, weight) in alternatives.iter_mut().zip(weights(&criteria)) {
+        alternative.weight = weight;
     }
     let weights = Fraction::ALL.map(|fraction| {
         let of = alternatives.iter().filter(|a| a.fraction == fraction);

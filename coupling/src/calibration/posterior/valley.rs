@@ -5,11 +5,10 @@
 //! least squares of the points with the cell's I_0 give a Gauss of (μ_a, μ_b), and its integral under the prior the cell's
 //! probability:
 //!
-//! > ln P = −χ²/2T − Σ ln σ²/2T + ½ ln |C| − ln (s_b − s_a),   s = I/(I + I_0),
+//! > ln P = −χ²/2T − Σ ln σ²/2T + ½ ln |C|,
 //!
-//! T the square of the error scale, C the covariance, s_b − s_a the Jacobian from (μ_s, μ_2 − μ_s). Wider by
-//! [`WIDER`] and with a share [`ANYWHERE`] of the probability spread over all cells alike, so that the proposals have
-//! the longer tails.
+//! T the square of the error scale, C the covariance. Wider by [`WIDER`] and with a share [`ANYWHERE`] of the probability spread
+//! over all cells alike, so that the proposals have the longer tails.
 
 use super::{MuIFit, Walker};
 use nalgebra::{Matrix2, Vector2};
@@ -34,7 +33,6 @@ struct Cell {
 /// The cells from one end of ln I_0 to the other.
 pub(super) struct Valley {
     limits: [f64; 2],
-    ends: [f64; 2],
     cells: Vec<Cell>,
     cumulative: Vec<f64>,
 }
@@ -84,7 +82,6 @@ impl Valley {
             .collect();
         Some(Self {
             limits,
-            ends,
             cells,
             cumulative,
         })
@@ -92,12 +89,6 @@ impl Valley {
 
     fn width(&self) -> f64 {
         (self.limits[1] - self.limits[0]) / CELLS as f64
-    }
-
-    /// s at both ends of the data.
-    fn shares(&self, log_i_0: f64) -> [f64; 2] {
-        let i_0 = log_i_0.exp();
-        self.ends.map(|i| i / (i + i_0))
     }
 
     /// A proposal.
@@ -109,12 +100,10 @@ impl Valley {
         let log_i_0 = self.limits[0] + (k as f64 + rng.random_range(0.0..1.0f64)) * self.width();
         let normal = Vector2::from_fn(|_, _| rng.sample(StandardNormal));
         let at_ends = cell.mean + cell.factor * normal;
-        let [a, b] = self.shares(log_i_0);
-        let span = (at_ends[1] - at_ends[0]) / (b - a);
-        Walker::new(at_ends[0] - span * a, span, log_i_0)
+        Walker::new(at_ends[0], at_ends[1], log_i_0)
     }
 
-    /// Logarithm of the proposals' density in (μ_s, μ_2 − μ_s, ln I_0), but for a constant.
+    /// Logarithm of the proposals' density in (μ_a, μ_b, ln I_0), but for a constant.
     pub(super) fn log_density(&self, w: &Walker) -> f64 {
         let place = (w[2] - self.limits[0]) / self.width();
         let k = (place.max(0.0) as usize).min(CELLS - 1);
@@ -122,15 +111,13 @@ impl Valley {
         if cell.probability <= 0.0 {
             return f64::NEG_INFINITY;
         }
-        let [a, b] = self.shares(w[2]);
-        let off = Vector2::new(w[0] + w[1] * a, w[0] + w[1] * b) - cell.mean;
+        let off = Vector2::new(w[0], w[1]) - cell.mean;
         let f = &cell.factor;
         let first = off[0] / f[(0, 0)];
         let second = (off[1] - f[(1, 0)] * first) / f[(1, 1)];
         cell.probability.ln()
             - (f[(0, 0)] * f[(1, 1)]).ln()
             - 0.5 * (first * first + second * second)
-            + (b - a).ln()
     }
 }
 
@@ -163,7 +150,7 @@ fn cell(
     let covariance = inverse * temperature;
     let factor = covariance.cholesky()?.l();
     let size = factor[(0, 0)] * factor[(1, 1)];
-    let log = -0.5 * twice / temperature + size.ln() - (b - a).ln();
+    let log = -0.5 * twice / temperature + size.ln();
     log.is_finite().then(|| {
         let factor = factor * WIDER;
         let cell = Cell {
