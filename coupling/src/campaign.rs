@@ -9,16 +9,19 @@ mod search;
 mod threshold;
 mod verdict;
 
-pub use design::{Precision, Prospect, choose_slopes, prospect};
-pub use plan::{Bracket, CampaignError, CampaignSpec, GuessedLaw, OtherBed};
+pub use design::{
+    Depths, Flow, Precision, Prospect, choose_flows, choose_slopes, cost, prospect,
+    prospect_of_flows,
+};
+pub use plan::{Bracket, CampaignError, CampaignSpec, FlowsOfDepth, GuessedLaw, OtherBed};
 pub use threshold::{NonLocal, Threshold, Trial, non_local_length, threshold};
 pub use verdict::Verdict;
 
 use crate::calibration::thesis::{EstimatorFit, VelocityProfile, estimator_fits};
 use crate::calibration::{
-    Alternative, BulkFlow, FluidityFit, FreeForm, LeftOut, LocalPoint, MuIFit, Posterior,
-    ResidualTests, Stress, compare_laws, fit_free_form, fit_mu_i, left_out, pressure_ratio,
-    residual_tests, sample_posterior,
+    Alternative, BulkFlow, FluidityFit, FreeForm, JointComparison, LeftOut, LocalPoint, MuIFit,
+    Posterior, ResidualTests, Stress, compare_joint_laws, compare_laws, fit_free_form, fit_mu_i,
+    left_out, pressure_ratio, residual_tests, sample_posterior,
 };
 use crate::incline::{Cost, InclineResult, InclineRun, InclineSpec, Purpose, Start};
 use rayon::prelude::*;
@@ -56,7 +59,7 @@ pub enum CampaignEvent<'a> {
 /// Result of a campaign.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct CampaignResult {
-    /// All runs: measured flows by rising slope, then the search for the stop, then for the onset, then those of other
+    /// All runs: measured flows by rising slope, then those of other depths, then the search for the stop, then for the onset, then those of other
     /// depths for the stop.
     pub runs: Vec<InclineResult>,
     /// Lowest slope where a flow goes on, and the highest below it where one stops (degrees).
@@ -95,6 +98,9 @@ pub struct CampaignResult {
     /// Competing laws of |τ|/p, the best supported first.
     #[serde(default)]
     pub alternatives: Vec<Alternative>,
+    /// Laws of |τ|/p and φ together: one φ, φ(I), φ(I) and dilatancy.
+    #[serde(default)]
+    pub joint: Option<JointComparison>,
     /// Non-local fluidity against the local law, on the profiles through the depth.
     #[serde(default)]
     pub fluidity: Option<FluidityFit>,
@@ -155,6 +161,8 @@ pub fn run_campaign(
         tasks.extend(spec.depth_beds().map(Task::Depth));
     }
     let searches = tasks.len();
+    let elsewhere = spec.flows_elsewhere().into_iter().rev();
+    tasks.extend(elsewhere.map(|(angle, bed)| Task::Flow(angle, bed)));
     let angles = spec.sorted_flow_angles().into_iter().rev();
     let flow_beds = spec.full_beds().take(spec.flow_beds.max(1)).rev();
     tasks.extend(angles.flat_map(|angle| flow_beds.clone().map(move |bed| Task::Flow(angle, bed))));
@@ -226,11 +234,16 @@ pub fn evaluate(
     .map(|stress| fit_mu_i(&points, stress));
     let estimators = estimator_fits(&profiles);
     // A flow that was to be measured and stopped, or went on, tells about the stop as well.
-    let stop = bracket(stop_runs.iter().chain(&flows));
+    let full = |r: &&InclineResult| spec.full_beds().contains(&(r.bed as usize));
+    let stop = bracket(stop_runs.iter().chain(flows.iter().filter(full)));
     let onset = bracket(onset_runs.iter());
     // Where half of the beds stop: by all runs of that depth that started from flow.
     let outcome = |r: &InclineResult| (r.slope_degrees, r.flows());
-    let full_stops: Vec<(f64, bool)> = stop_runs.iter().chain(&flows).map(outcome).collect();
+    let full_stops: Vec<(f64, bool)> = stop_runs
+        .iter()
+        .chain(flows.iter().filter(full))
+        .map(outcome)
+        .collect();
     let height = spec.base.bed_height();
     let stop_threshold = threshold(&full_stops, height);
     let onset_threshold = threshold(&onset_runs.iter().map(outcome).collect::<Vec<_>>(), height);
@@ -252,6 +265,7 @@ pub fn evaluate(
     let fit_zz = fits[1].as_ref().ok();
     let posterior_zz = fit_zz.and_then(|fit| sample_posterior(&points, fit, spec.seed));
     let alternatives = compare_laws(&points, mean_pressure).unwrap_or_default();
+    let joint = compare_joint_laws(&points, mean_pressure).ok();
     let knots = (points.len() / 8).clamp(4, 12);
     let free_form = fit_free_form(&points, mean_pressure, knots, true).ok();
     let mut cost = Cost::default();
@@ -285,6 +299,7 @@ pub fn evaluate(
         non_local: &non_local,
         residuals: &residuals,
         alternatives: &alternatives,
+        joint: &joint,
         posterior: &posterior,
         points: &points,
         candidates: candidates::Candidates {
@@ -319,6 +334,7 @@ pub fn evaluate(
         non_local,
         residuals,
         alternatives,
+        joint,
         fluidity,
         free_form,
         posterior,

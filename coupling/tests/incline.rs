@@ -1,13 +1,14 @@
 //! Runs of real grains down a slope.
 
 use colluvium_coupling::campaign::{
-    Bracket, CampaignError, CampaignEvent, CampaignSpec, GuessedLaw, evaluate, run_campaign,
+    Bracket, CampaignError, CampaignEvent, CampaignSpec, FlowsOfDepth, GuessedLaw, OtherBed,
+    evaluate, run_campaign,
 };
 use colluvium_coupling::incline::{
     InclineError, InclineResult, InclineRun, InclineSpec, Outcome, Purpose, Start,
 };
 use colluvium_dem::preparation::{Bed, InclineBed, RadiusLaw, settle_incline_bed};
-use colluvium_dem::{ContactLaw, Hooke, ShapeParameter, TangentialSpring, Threads};
+use colluvium_dem::{ContactLaw, Grain, Hooke, ShapeParameter, TangentialSpring, Threads};
 use std::ops::ControlFlow;
 use std::sync::Mutex;
 use std::sync::OnceLock;
@@ -281,6 +282,7 @@ fn tiny_campaign() -> CampaignSpec {
         base,
         published_material: Some("moderate".into()),
         flow_angles_degrees: vec![37.0, 31.0, 33.0, 35.0],
+        flows_of_depth: Vec::new(),
         guessed_law: GuessedLaw {
             mu_s: 0.45,
             mu_2: 0.95,
@@ -309,7 +311,19 @@ fn tiny_campaign() -> CampaignSpec {
 
 #[test]
 fn a_campaign_does_not_depend_on_threads_and_goes_on_where_it_stopped() {
-    let campaign = tiny_campaign();
+    let mut campaign = tiny_campaign();
+    // One more flow, of the lower half of the bed.
+    let grains = &campaign.base.bed;
+    let highest = grains.iter().fold(0.0f64, |h, g| h.max(g.position.z));
+    let low = |g: &&Grain| g.fixed || g.position.z < 0.5 * highest;
+    let bed = OtherBed {
+        domain: campaign.base.domain,
+        grains: grains.iter().filter(low).cloned().collect(),
+    };
+    campaign.flows_of_depth = vec![FlowsOfDepth {
+        bed,
+        slopes_degrees: vec![33.0],
+    }];
     let never = AtomicBool::new(false);
     let pool = |n| {
         rayon::ThreadPoolBuilder::new()
@@ -341,6 +355,10 @@ fn a_campaign_does_not_depend_on_threads_and_goes_on_where_it_stopped() {
         .map(|r| r.slope_degrees.round())
         .collect();
     assert_eq!(angles, [31.0, 33.0, 35.0, 37.0]);
+    let (deep, shallow) = (&two.runs[1], &two.runs[4]);
+    assert_eq!((deep.bed, shallow.bed, shallow.slope_degrees), (0, 1, 33.0));
+    assert!(shallow.purpose == Purpose::Measure && shallow.height < 0.7 * deep.height);
+    assert!(shallow.steady.mean < deep.steady.mean);
     assert!(two.verdict.text.contains("top, with Phi"));
     assert!(!two.points.is_empty() && two.estimators.len() == 6);
     // Averages this short may not determine a law; then the verdict says so.

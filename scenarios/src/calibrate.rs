@@ -6,7 +6,8 @@ mod design;
 mod findings;
 mod material;
 
-pub use design::{flow_degrees, prospects};
+use design::flows_of_depths;
+pub use design::{designs, flow_degrees};
 pub use material::published_material;
 
 use crate::cost::Cost;
@@ -21,8 +22,8 @@ use crate::scene::{InclineModel, InclineScene, Scene, SceneBody};
 use crate::summary::Status;
 use colluvium_coupling::calibration::{MuIFit, friction_table};
 use colluvium_coupling::campaign::{
-    Bracket, CampaignError, CampaignEvent, CampaignResult, CampaignSpec, GuessedLaw, OtherBed,
-    run_campaign,
+    Bracket, CampaignError, CampaignEvent, CampaignResult, CampaignSpec, FlowsOfDepth, GuessedLaw,
+    OtherBed, run_campaign,
 };
 use colluvium_coupling::incline::{InclineResult, Purpose};
 use colluvium_dem::Threads;
@@ -137,6 +138,8 @@ fn finished_angles(directory: &RunDirectory, resume: bool) -> Result<Angles, Fai
 struct Beds {
     others: Vec<OtherBed>,
     depths: Vec<OtherBed>,
+    /// Of the depths of flows, in the order of the design.
+    of_flows: Vec<OtherBed>,
     /// Grain-steps that settling them took.
     grain_steps: u64,
 }
@@ -150,7 +153,9 @@ fn more_beds(body: &InclineScene) -> Result<Option<Beds>, Failure> {
             ..body.clone()
         })
         .collect();
-    scenes.extend(keys.depths.iter().map(|factor| {
+    let of_flows = flows_of_depths(body);
+    let factors = keys.depths.iter().chain(of_flows.iter().map(|(f, _)| f));
+    scenes.extend(factors.map(|factor| {
         let mut shallow = body.clone();
         shallow.grains.count = (body.grains.count as f64 * factor).round().max(50.0) as u64;
         shallow
@@ -164,10 +169,10 @@ fn more_beds(body: &InclineScene) -> Result<Option<Beds>, Failure> {
     for (k, bed) in settled.into_iter().enumerate() {
         let Some(bed) = bed? else { return Ok(None) };
         beds.grain_steps += bed.report.grain_steps;
-        let list = if (k as u64) + 1 < keys.beds {
-            &mut beds.others
-        } else {
-            &mut beds.depths
+        let list = match k + 1 {
+            n if n < keys.beds as usize => &mut beds.others,
+            n if n < keys.beds as usize + keys.depths.len() => &mut beds.depths,
+            _ => &mut beds.of_flows,
         };
         list.push(OtherBed {
             domain: bed.domain,
@@ -184,7 +189,22 @@ fn campaign_spec(scene: &Scene, body: &InclineScene, bed: &Bed, beds: Beds) -> C
         high: b.high,
         resolution: b.resolution,
     };
+    // Where beds are not settled yet, the first stands for them.
+    let mut of_flows = beds.of_flows.into_iter();
+    let flows_of_depth = flows_of_depths(body)
+        .into_iter()
+        .map(|(_, slopes_degrees)| {
+            let first = || OtherBed {
+                domain: bed.domain,
+                grains: bed.grains.clone(),
+            };
+            FlowsOfDepth {
+                bed: of_flows.next().unwrap_or_else(first),
+                slopes_degrees,
+            }
+        });
     CampaignSpec {
+        flows_of_depth: flows_of_depth.collect(),
         // Angles run side by side, each on one thread: no bit depends on their number.
         base: incline::spec(body, bed, Threads::Serial),
         published_material: published_material(scene).map(String::from),

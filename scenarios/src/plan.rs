@@ -214,31 +214,62 @@ fn incline(scene: &Scene, body: &InclineScene) -> Result<String, Failure> {
         ),
     }
     let c = &body.calibration;
+    let designs = calibrate::designs(body);
     lines.say(
         "calibrate",
         &format!(
-            "flows at {:?} degrees, where a flow stops in [{}, {}], where rest ends in [{}, {}]",
-            calibrate::flow_degrees(body),
+            "flows at {}, where a flow stops in [{}, {}], where rest ends in [{}, {}]",
+            told(&designs[0].flows),
             c.stop.low,
             c.stop.high,
             c.onset.low,
             c.onset.high
         ),
     );
-    let [own, best] = calibrate::prospects(body);
-    let tells = |p: &colluvium_coupling::campaign::Prospect| {
-        let [a, b, c] = p.errors;
-        format!("±{a:.3}, ±{b:.3}, ±{c:.3}")
-    };
+    let [own, slopes, both] = designs.each_ref().map(|design| {
+        let [a, b, c] = design.prospect.errors;
+        format!(
+            "±{a:.3}, ±{b:.3}, ±{c:.3}, at the cost of {:.1} full flows",
+            design.cost
+        )
+    });
     lines.say(
         "design",
         &format!(
-            "if the guess is true these flows tell mu_s, mu_2, i_0 to {}; as many D-optimal slopes (flow_degrees = []) to {}",
-            tells(&own),
-            tells(&best)
+            "if the guess is true these flows tell mu_s, mu_2, i_0 to {own}; as many D-optimal slopes (flow_degrees = []) to {slopes}"
+        ),
+    );
+    let chosen = &designs[2];
+    let ratio = designs[1].prospect.determinant / chosen.prospect.determinant;
+    lines.say(
+        "depths",
+        &format!(
+            "slopes and depths chosen together (depth_choices): {} tell them to {both}: errors {:.2} times those of slopes alone; thinner \
+             flows waste the 7 d that are cut and hold by their length, deeper ones pay for layers that share one error",
+            told(&chosen.flows),
+            ratio.powf(1.0 / 6.0)
         ),
     );
     Ok(lines.0)
+}
+
+/// Slopes, and depths where they are not the full one.
+fn told(flows: &[colluvium_coupling::campaign::Flow]) -> String {
+    let mut list: Vec<(f64, Vec<f64>)> = Vec::new();
+    for flow in flows {
+        match list.iter_mut().find(|(depth, _)| *depth == flow.depth) {
+            Some((_, slopes)) => slopes.push(flow.slope_degrees),
+            None => list.push((flow.depth, vec![flow.slope_degrees])),
+        }
+    }
+    let parts: Vec<String> = list
+        .iter()
+        .map(|(depth, slopes)| match *depth {
+            1.0 => format!("{slopes:?} degrees"),
+            _ => format!("{slopes:?} degrees at {depth} of the depth"),
+        })
+        .collect();
+    parts.join(", ")
 }
 
 fn bagnold(body: &BagnoldScene) -> Result<String, Failure> {

@@ -219,8 +219,8 @@ fn compare(depth: f64, seed: u64) -> Outcome<String> {
         percent.join(" | "),
         100.0 * drift,
         100.0 * report.slip,
-        report.shear_ratio,
-        report.pressure_ratio,
+        report.shear_ratio.unwrap_or(f64::NAN),
+        report.pressure_ratio.unwrap_or(f64::NAN),
     ) + &format!(
         " <!-- CPU s: full {:.2}, joined {:.2}, settling {:.2}, {:.2}; settling grain-steps {full_settling}, {joined_settling} -->",
         times[0], times[1], settling[0], settling[1]

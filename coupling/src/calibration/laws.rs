@@ -1,5 +1,11 @@
 //! Friction laws that are compared with μ(I) of Jop et al.
 
+mod deviation;
+mod joint;
+
+pub use deviation::Deviation;
+pub use joint::{Fraction, JointAlternative, JointComparison, compare_joint_laws};
+
 use super::least_squares::{FitError, levenberg_marquardt};
 use super::mu_i::{Stress, checked_points, run_numbers};
 use super::points::LocalPoint;
@@ -55,6 +61,24 @@ impl Law {
                 (mu_s * i_0 + mu_2 * i + mu_inf * i * i) / (i + i_0)
             }
             _ => f64::NAN,
+        }
+    }
+
+    /// ∂μ/∂(parameters) at I; `None` where the law has a pole at positive I.
+    fn gradient(self, parameters: &[f64], i: f64) -> Option<Vec<f64>> {
+        match (self, parameters) {
+            (Law::Constant, _) => Some(vec![1.0]),
+            (Law::Linear, _) => Some(vec![1.0, i]),
+            (Law::Jop, [mu_s, mu_2, i_0]) if *i_0 > 0.0 => {
+                let s = i / (i + i_0);
+                Some(vec![1.0 - s, s, -(mu_2 - mu_s) * s / (i + i_0)])
+            }
+            (Law::BarkerGray, [mu_s, _, i_0, _]) if *i_0 > 0.0 => {
+                let sum = i + i_0;
+                let miss = (mu_s - self.friction(parameters, i)) / sum;
+                Some(vec![i_0 / sum, i / sum, miss, i * i / sum])
+            }
+            _ => None,
         }
     }
 }
@@ -127,6 +151,34 @@ fn fit_law(law: Law, data: &[(f64, f64, f64)]) -> Result<Fitted, FitError> {
     }
 }
 
+/// QAICc of χ²/ĉ with k parameters and n effective points.
+fn criterion(chi_square: f64, k: f64, n: f64) -> f64 {
+    chi_square + 2.0 * k + 2.0 * k * (k + 1.0) / (n - k - 1.0).max(1.0)
+}
+
+/// Akaike weights of criteria of which the first is the least.
+fn weights(criteria: &[f64]) -> Vec<f64> {
+    let best = criteria.first().copied().unwrap_or(0.0);
+    let likelihood = |c: &f64| (-0.5 * (c - best)).exp();
+    let sum: f64 = criteria.iter().map(likelihood).sum();
+    criteria.iter().map(|c| likelihood(c) / sum).collect()
+}
+
+/// Σ_runs m ē²/(runs − `parameters`) for runs of m points whose normalised residuals have the mean ē; 0 where runs are too few.
+fn between_runs(normalised: &[f64], by_run: &[usize], parameters: usize) -> f64 {
+    let runs = by_run.iter().max().map_or(0, |m| m + 1);
+    if runs <= parameters {
+        return 0.0;
+    }
+    let mut sums = vec![(0.0, 0.0); runs];
+    for (residual, run) in normalised.iter().zip(by_run) {
+        sums[*run].0 += residual;
+        sums[*run].1 += 1.0;
+    }
+    let between: f64 = sums.iter().map(|(sum, n)| sum * sum / n).sum();
+    between / (runs - parameters) as f64
+}
+
 /// All laws that can be fitted, the best supported first.
 ///
 /// The scatter ĉ is that of the richest law that could be fitted: χ² over its degrees of freedom or, where the runs
@@ -147,22 +199,17 @@ pub fn compare_laws(points: &[LocalPoint], stress: Stress) -> Result<Vec<Alterna
     };
     let free = |k: usize| data.len().saturating_sub(k).max(1) as f64;
     let residual = |law: Law, p: &[f64], (i, mu, _): &(f64, f64, f64)| mu - law.friction(p, *i);
-    let mut scatter = (fit.chi_square / free(fit.parameters.len())).max(1.0);
-    if runs > fit.parameters.len() {
-        let mut sums = vec![(0.0, 0.0); runs];
-        for (point, run) in data.iter().zip(&by_run) {
-            sums[*run].0 += residual(*richest, &fit.parameters, point) * point.2.sqrt();
-            sums[*run].1 += 1.0;
-        }
-        let between: f64 = sums.iter().map(|(sum, n)| sum * sum / n).sum();
-        scatter = scatter.max(between / (runs - fit.parameters.len()) as f64);
-    }
+    let of_richest = data
+        .iter()
+        .map(|point| residual(*richest, &fit.parameters, point) * point.2.sqrt())
+        .collect::<Vec<f64>>();
+    let scatter = (fit.chi_square / free(fit.parameters.len())).max(1.0);
+    let scatter = scatter.max(between_runs(&of_richest, &by_run, fit.parameters.len()));
     let effective = (data.len() as f64 / scatter).max(runs as f64);
     let mut list: Vec<Alternative> = fits
         .into_iter()
         .map(|(law, fit)| {
             let k = fit.parameters.len() as f64;
-            let few = (effective - k - 1.0).max(1.0);
             let squares: f64 = data
                 .iter()
                 .map(|point| residual(law, &fit.parameters, point).powi(2))
@@ -173,18 +220,16 @@ pub fn compare_laws(points: &[LocalPoint], stress: Stress) -> Result<Vec<Alterna
                 errors: fit.variances.iter().map(|v| (v * own).sqrt()).collect(),
                 chi_square: fit.chi_square,
                 rms_residual: (squares / data.len() as f64).sqrt(),
-                criterion: fit.chi_square / scatter + 2.0 * k + 2.0 * k * (k + 1.0) / few,
+                criterion: criterion(fit.chi_square / scatter, k, effective),
                 weight: 0.0,
                 parameters: fit.parameters,
             }
         })
         .collect();
     list.sort_by(|a, b| a.criterion.total_cmp(&b.criterion));
-    let best = list[0].criterion;
-    let likelihood = |a: &Alternative| (-0.5 * (a.criterion - best)).exp();
-    let sum: f64 = list.iter().map(likelihood).sum();
-    for alternative in &mut list {
-        alternative.weight = likelihood(alternative) / sum;
+    let criteria: Vec<f64> = list.iter().map(|a| a.criterion).collect();
+    for (alternative, weight) in list.iter_mut().zip(weights(&criteria)) {
+        alternative.weight = weight;
     }
     Ok(list)
 }

@@ -19,7 +19,10 @@ pub use friction_map::{
     Axis, Curve, FrictionMap, Interpolated, InterpolationError, MapCell, MapError, Missed,
     WithError,
 };
-pub use laws::{Alternative, Law, compare_laws};
+pub use laws::{
+    Alternative, Deviation, Fraction, JointAlternative, JointComparison, Law, compare_joint_laws,
+    compare_laws,
+};
 pub use least_squares::FitError;
 pub use mu_i::{MuIFit, SolidFractionFit, Stress, fit_mu_i, fit_solid_fraction, mu_of_i};
 pub use points::{LocalPoint, PointRules, flow_height, local_points};

@@ -98,7 +98,7 @@ fn gradient(p: &Vector3<f64>, i: f64) -> Vector3<f64> {
 }
 
 /// ∂μ/∂I.
-fn slope(p: &Vector3<f64>, i: f64) -> f64 {
+pub(super) fn slope(p: &Vector3<f64>, i: f64) -> f64 {
     (p[1] - p[0]) * p[2] / ((i + p[2]) * (i + p[2]))
 }
 
@@ -364,6 +364,9 @@ fn mean_between_runs(points: &[LocalPoint], by_run: &[usize], runs: usize) -> (f
     )
 }
 
+/// Least error of φ: slices of a dense bed fluctuate so little that counting errors alone would weigh absurdly.
+pub(super) const LEAST_FRACTION_ERROR: f64 = 1e-4;
+
 /// Straight line through φ(I), weights 1/σ_φ², errors scaled as for μ(I) by χ² alone.
 ///
 /// # Errors
@@ -378,8 +381,7 @@ pub fn fit_solid_fraction(points: &[LocalPoint]) -> Result<SolidFractionFit, Fit
     let data: Vec<_> = points
         .iter()
         .map(|p| {
-            // Slices of a dense bed fluctuate so little that counting errors alone would weigh absurdly.
-            let error = p.solid_fraction_error.max(1e-4);
+            let error = p.solid_fraction_error.max(LEAST_FRACTION_ERROR);
             (p.inertial_number, p.solid_fraction, 1.0 / (error * error))
         })
         .collect();

@@ -2,20 +2,28 @@
 //!
 //! Likelihood: Gauss' in μ with the effective variance σ² = σ_μ² + (∂μ/∂I)² σ_I² of each point, which depends on the
 //! parameters, all of it over the square of the fit's `error_scale` (layers of a run are not independent). Prior: flat
-//! in μ_s ≥ 0, μ_2 > μ_s and ln I_0, the last within a factor of 100 beyond the range of I of the data: what the data
-//! do not say stays bounded, and is seen to be only that. Sampled by Metropolis' random walk with steps from the
-//! fit's covariance, the random numbers seeded. Where the scale of the errors is known from ν degrees of freedom only,
-//! each sample is moved away from the median by √(ν/χ²), χ² drawn with ν degrees: Student's tails.
+//! in μ_a and μ_b, the friction at the two ends of the data, and in ln I_0, where μ_s ≥ 0 and μ_2 > μ_s, I_0 within a factor of
+//! 100 beyond the range of I of the data: what the data do not say stays bounded, and is seen to be only that. (Flat in
+//! μ_2 − μ_s instead, laws that are straight through the data would weigh as I_0, and its bound would say what comes out.)
+//!
+//! μ_2 and I_0 lie along a bent valley, which a random walk follows slowly. So the valley is laid out first ([`Valley`]) and
+//! whole samples are proposed from it and taken by the rule of Metropolis and Hastings for proposals that do not depend on
+//! where the chain is (Tierney 1994), the random numbers seeded. Where the scale of the errors is known from ν degrees of
+//! freedom only, each sample is moved away from the median of (μ_a, μ_b, ln I_0), along the valley, by √(ν/χ²), χ² drawn with ν
+//! degrees: Student's tails.
+
+mod valley;
 
 use super::mu_i::{MuIFit, ONE_SIGMA, Stress, mu_of_i};
 use super::points::LocalPoint;
 use crate::steady_state::autocorrelation_time;
-use nalgebra::{Matrix3, Vector3};
-use rand::{Rng, RngExt, SeedableRng};
+use nalgebra::Vector3;
+use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use rand_distr::{ChiSquared, Distribution, StandardNormal};
+use rand_distr::{ChiSquared, Distribution};
 use serde::{Deserialize, Serialize};
 use statrs::distribution::{ContinuousCDF, StudentsT};
+use valley::Valley;
 
 /// Samples and what they say.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
@@ -24,7 +32,7 @@ pub struct Posterior {
     pub samples: Vec<[f64; 3]>,
     /// Quantiles 0.025, 0.16, 0.5, 0.84, 0.975 of each parameter.
     pub quantiles: [[f64; 5]; 3],
-    /// Share of steps that were taken.
+    /// Share of proposals that were taken.
     pub acceptance: f64,
     /// Independent samples that the least mixed parameter's are worth.
     pub effective_samples: f64,
@@ -32,18 +40,23 @@ pub struct Posterior {
 
 /// Samples kept.
 const KEPT: usize = 1000;
-/// Steps between kept samples.
-const THINNING: usize = 15;
-/// Steps before the first.
-const BURN_IN: usize = 3000;
+/// Proposals between kept samples.
+const THINNING: usize = 5;
+/// Proposals before the first.
+const BURN_IN: usize = 100;
 /// How far I_0 may lie outside the data, as a factor.
 const BEYOND_DATA: f64 = 100.0;
 
-/// The law as the walk sees it: μ_s, μ_2 − μ_s and ln I_0.
+/// The law as the chain sees it: friction at the two ends of the data, and ln I_0.
 type Walker = Vector3<f64>;
 
-fn law(w: &Walker) -> [f64; 3] {
-    [w[0], w[0] + w[1], w[2].exp()]
+/// (μ_s, μ_2, I_0) for the ends of the data.
+fn law(w: &Walker, ends: [f64; 2]) -> [f64; 3] {
+    let i_0 = w[2].exp();
+    let [a, b] = ends.map(|i| i / (i + i_0));
+    let span = (w[1] - w[0]) / (b - a);
+    let mu_s = w[0] - span * a;
+    [mu_s, mu_s + span, i_0]
 }
 
 /// Samples the posterior of a fit from the points it was made from; the same seed gives the same samples.
@@ -64,15 +77,14 @@ pub fn sample_posterior(points: &[LocalPoint], fit: &MuIFit, seed: u64) -> Optio
     });
     let narrowed = fit.error_scale / student.map_or(1.0, |(_, quantile)| quantile);
     let temperature = narrowed * narrowed;
-    let limits = [
-        (fit.valid_i[0] / BEYOND_DATA).ln(),
-        (fit.valid_i[1] * BEYOND_DATA).ln(),
-    ];
+    let ends = fit.valid_i;
+    let limits = [(ends[0] / BEYOND_DATA).ln(), (ends[1] * BEYOND_DATA).ln()];
     let log_posterior = |w: &Walker| {
-        if w[0] < 0.0 || w[1] <= 0.0 || w[2] < limits[0] || w[2] > limits[1] {
+        let [mu_s, mu_2, i_0] = law(w, ends);
+        let allowed = mu_s >= 0.0 && mu_2 > mu_s && (limits[0]..=limits[1]).contains(&w[2]);
+        if !allowed {
             return f64::NEG_INFINITY;
         }
-        let [mu_s, mu_2, i_0] = law(w);
         let mut sum = 0.0;
         for p in points {
             let (mu, error) = friction(p);
@@ -84,33 +96,25 @@ pub fn sample_posterior(points: &[LocalPoint], fit: &MuIFit, seed: u64) -> Optio
         }
         sum / temperature
     };
-    // Covariance of (μ_s, Δμ, ln I_0) from that of (μ_s, μ_2, I_0).
-    let c = Matrix3::from_fn(|r, k| fit.covariance[r][k]);
-    let turn = Matrix3::new(1.0, 0.0, 0.0, -1.0, 1.0, 0.0, 0.0, 0.0, 1.0 / fit.i_0);
-    let mut covariance = turn * c * turn.transpose();
-    // A parameter that is not known would send every step out of bounds.
-    let largest = Vector3::new(0.3, 0.5, 1.0);
-    for k in 0..3 {
-        let shrink = (largest[k] / covariance[(k, k)].sqrt()).min(1.0);
-        for other in 0..3 {
-            covariance[(k, other)] *= shrink;
-            covariance[(other, k)] *= shrink;
-        }
-        covariance[(k, k)] += 1e-12;
-    }
-    let stride = covariance.cholesky()?.l() * (2.38 / 3f64.sqrt());
+    let data: Vec<[f64; 4]> = points
+        .iter()
+        .map(|p| {
+            let (mu, error) = friction(p);
+            [p.inertial_number, mu, error, p.inertial_number_error]
+        })
+        .collect();
+    let valley = Valley::of(&data, fit, limits, temperature)?;
     let mut rng = ChaCha8Rng::seed_from_u64(seed);
-    let start = Vector3::new(
-        fit.mu_s,
-        fit.mu_2 - fit.mu_s,
-        fit.i_0.ln().clamp(limits[0], limits[1]),
-    );
-    let (mut here, mut height) = (start, log_posterior(&start));
+    // Height above the proposals: what the chain is to be moved by.
+    let above = |w: &Walker| log_posterior(w) - valley.log_density(w);
+    let [mu_a, mu_b] = ends.map(|i| mu_of_i(fit.mu_s, fit.mu_2, fit.i_0, i));
+    let mut here = Vector3::new(mu_a, mu_b, fit.i_0.ln().clamp(limits[0], limits[1]));
+    let mut height = above(&here);
     let mut samples = Vec::with_capacity(KEPT);
     let (mut taken, steps) = (0usize, BURN_IN + KEPT * THINNING);
     for step in 0..steps {
-        let trial = here + stride * random_direction(&mut rng);
-        let value = log_posterior(&trial);
+        let trial = valley.draw(&mut rng);
+        let value = above(&trial);
         if rng.random_range(0.0..1.0f64).ln() < value - height {
             (here, height) = (trial, value);
             taken += 1;
@@ -136,7 +140,7 @@ pub fn sample_posterior(points: &[LocalPoint], fit: &MuIFit, seed: u64) -> Optio
             }
         }
     }
-    let samples: Vec<[f64; 3]> = samples.iter().map(law).collect();
+    let samples: Vec<[f64; 3]> = samples.iter().map(|w| law(w, ends)).collect();
     Some(Posterior {
         quantiles: std::array::from_fn(|k| QUANTILES.map(|q| quantile(&samples, |s| s[k], q))),
         samples,
@@ -166,10 +170,6 @@ fn effective_samples(samples: &[Walker]) -> f64 {
         n / autocorrelation_time(&centred)
     };
     (0..3).map(of).fold(f64::INFINITY, f64::min)
-}
-
-fn random_direction(rng: &mut impl Rng) -> Vector3<f64> {
-    Vector3::from_fn(|_, _| rng.sample(StandardNormal))
 }
 
 impl Posterior {

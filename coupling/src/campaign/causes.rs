@@ -2,7 +2,8 @@
 
 use super::verdict::{Evidence, LARGEST_MISFIT};
 use crate::calibration::{
-    Alternative, Law, LocalPoint, MuIFit, Posterior, mu_of_i, pressure_ratio,
+    Alternative, Fraction, JointComparison, Law, LocalPoint, MuIFit, Posterior, mu_of_i,
+    pressure_ratio,
 };
 
 /// Where the error of the law matters to a continuum: in an inclined flow u ∝ I, and I follows from μ(I) = tan θ.
@@ -84,6 +85,36 @@ pub(super) fn laws(alternatives: &[Alternative], points: &[LocalPoint], text: &m
             values.join(", ")
         ));
     }
+}
+
+/// Whether φ(I) and dilatancy are supported beside one φ.
+pub(super) fn joint_laws(joint: &JointComparison) -> Option<String> {
+    let best = joint.alternatives.first()?;
+    let list: Vec<String> = Fraction::ALL
+        .iter()
+        .zip(joint.weights)
+        .map(|(fraction, weight)| format!("{} {:.0} %", fraction.title(), 100.0 * weight))
+        .collect();
+    let d = &joint.deviation;
+    let told = joint
+        .best(Fraction::Dilatancy)
+        .and_then(|a| a.dilatancy)
+        .map_or(
+            "no K above 0 makes friction of a layer's excess of phi".to_owned(),
+            |[k, error]| {
+                format!("mu rises by K = {k:.2} ± {error:.2} times a layer's excess of phi")
+            },
+        );
+    Some(format!(
+        "Friction and solid fraction together, by the same criterion: {}; best is {} with {}. Beside phi(I) flows differ by {:.4} \
+         and layers by {:.4} more than the {:.4} of counting; {told}.",
+        list.join(", "),
+        best.friction.title(),
+        best.fraction.title(),
+        d.flows,
+        d.layers,
+        d.counting
+    ))
 }
 
 /// Smallest change of μ over the depth, relative, that is worth a word.

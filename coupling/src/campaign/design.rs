@@ -3,7 +3,12 @@
 //! A steady flow at θ has I = I_0 (tan θ − μ_s)/(μ_2 − tan θ) and gives one pair (I, μ) with the relative errors
 //! `relative_i` and `relative_mu`. Its Fisher information on the law is g gᵀ/σ², with g = ∂μ/∂(μ_s, μ_2, I_0) at that I
 //! and σ² = (relative_mu μ)² + (∂μ/∂I relative_i I)². A design is the better, the larger the determinant of the sum
-//! over its slopes (D-optimal: the smallest volume of the confidence ellipsoid; Fedorov 1972).
+//! over its slopes (D-optimal: the smallest volume of the confidence ellipsoid; Fedorov 1972). Slopes together with depths, at a
+//! given cost: [`choose_flows`].
+
+mod depths;
+
+pub use depths::{Depths, Flow, choose_flows, cost, prospect_of_flows};
 
 use super::GuessedLaw;
 use nalgebra::{Matrix3, Vector3};
@@ -27,7 +32,13 @@ impl Default for Precision {
     }
 }
 
-fn information(law: &GuessedLaw, precision: &Precision, slope_degrees: f64) -> Matrix3<f64> {
+/// Information of one flow; `shift` is a standard error of μ beside those of `precision`.
+fn information(
+    law: &GuessedLaw,
+    precision: &Precision,
+    shift: f64,
+    slope_degrees: f64,
+) -> Matrix3<f64> {
     let t = slope_degrees.to_radians().tan();
     if t <= law.mu_s || t >= law.mu_2 {
         return Matrix3::zeros();
@@ -37,7 +48,7 @@ fn information(law: &GuessedLaw, precision: &Precision, slope_degrees: f64) -> M
     let span = law.mu_2 - law.mu_s;
     let g = Vector3::new(1.0 - s, s, -span * i / (i + law.i_0).powi(2));
     let lever = span * law.i_0 / (i + law.i_0).powi(2) * precision.relative_i * i;
-    let variance = (precision.relative_mu * t).powi(2) + lever * lever;
+    let variance = (precision.relative_mu * t).powi(2) + lever * lever + shift * shift;
     g * g.transpose() / variance
 }
 
@@ -50,21 +61,34 @@ pub struct Prospect {
     pub determinant: f64,
 }
 
+impl Prospect {
+    fn of(sum: Matrix3<f64>) -> Self {
+        // What rounding leaves of the determinant of a singular matrix is no information.
+        let size: f64 = (0..3).map(|k| sum[(k, k)]).product();
+        let determinant = Some(sum.determinant()).filter(|d| *d > 1e-11 * size);
+        let determinant = determinant.unwrap_or(0.0);
+        let errors = match sum.try_inverse() {
+            Some(c) if determinant > 0.0 => std::array::from_fn(|k| c[(k, k)].max(0.0).sqrt()),
+            _ => [f64::INFINITY; 3],
+        };
+        Self {
+            errors,
+            determinant,
+        }
+    }
+}
+
 /// What flows at the given slopes (degrees) would say.
 pub fn prospect(law: &GuessedLaw, precision: &Precision, slopes: &[f64]) -> Prospect {
-    let sum: Matrix3<f64> = slopes.iter().map(|s| information(law, precision, *s)).sum();
-    // What rounding leaves of the determinant of a singular matrix is no information.
-    let size: f64 = (0..3).map(|k| sum[(k, k)]).product();
-    let determinant = Some(sum.determinant()).filter(|d| *d > 1e-11 * size);
-    let determinant = determinant.unwrap_or(0.0);
-    let errors = match sum.try_inverse() {
-        Some(c) if determinant > 0.0 => std::array::from_fn(|k| c[(k, k)].max(0.0).sqrt()),
-        _ => [f64::INFINITY; 3],
-    };
-    Prospect {
-        errors,
-        determinant,
-    }
+    let of = |slope: &f64| information(law, precision, 0.0, *slope);
+    Prospect::of(slopes.iter().map(of).sum())
+}
+
+/// Slopes from `low` to `high` in steps of a quarter of a degree.
+fn grid([low, high]: [f64; 2]) -> Vec<f64> {
+    const GRID: f64 = 0.25;
+    let steps = ((high - low) / GRID).floor().max(0.0) as usize;
+    (0..=steps).map(|k| low + GRID * k as f64).collect()
 }
 
 /// The D-optimal choice of `count` slopes from `low` to `high` (degrees) at least `apart` from each other, on a grid of
@@ -76,9 +100,7 @@ pub fn choose_slopes(
     count: usize,
     apart: f64,
 ) -> Vec<f64> {
-    const GRID: f64 = 0.25;
-    let steps = ((high - low) / GRID).floor().max(0.0) as usize;
-    let candidates: Vec<f64> = (0..=steps).map(|k| low + GRID * k as f64).collect();
+    let candidates = grid([low, high]);
     let room = 1 + ((high - low).max(0.0) / apart + 1e-9) as usize;
     let count = count.min(room);
     if count < 2 {

@@ -49,6 +49,15 @@ pub struct OtherBed {
     pub grains: Vec<Grain>,
 }
 
+/// Flows that are measured on a bed of another depth.
+#[derive(Clone, Debug)]
+pub struct FlowsOfDepth {
+    /// The bed.
+    pub bed: OtherBed,
+    /// Their slopes (degrees).
+    pub slopes_degrees: Vec<f64>,
+}
+
 /// A campaign.
 #[derive(Clone, Debug)]
 pub struct CampaignSpec {
@@ -58,6 +67,8 @@ pub struct CampaignSpec {
     pub published_material: Option<String>,
     /// Slopes of the measured flows (degrees).
     pub flow_angles_degrees: Vec<f64>,
+    /// Flows measured besides, on beds of other depths.
+    pub flows_of_depth: Vec<FlowsOfDepth>,
     /// Starting velocities of measured flows.
     pub guessed_law: GuessedLaw,
     /// Whether stop and onset are sought; without, flows alone are measured.
@@ -121,11 +132,12 @@ impl CampaignSpec {
                 })
             }
         };
-        for angle in &self.flow_angles_degrees {
+        let of_depth = self.flows_of_depth.iter().flat_map(|f| &f.slopes_degrees);
+        for angle in self.flow_angles_degrees.iter().chain(of_depth.clone()) {
             let ok = *angle > 0.0 && *angle < 90.0;
             check("flow_angles_degrees", *angle, ok, "above 0 and below 90")?;
         }
-        let count = self.flow_angles_degrees.len() as f64;
+        let count = (self.flow_angles_degrees.len() + of_depth.clone().count()) as f64;
         check(
             "flow_angles_degrees (number)",
             count,
@@ -183,7 +195,9 @@ impl CampaignSpec {
             "above guessed_law.mu_s, both positive",
         )?;
         check("guessed_law.i_0", g.i_0, g.i_0 > 0.0, "positive")?;
-        self.flow_run(self.sorted_flow_angles()[0], 0).validate()?;
+        let mut angles = self.flow_angles_degrees.iter().chain(of_depth);
+        let first = angles.next().copied().unwrap_or(self.stop.high);
+        self.flow_run(first, 0).validate()?;
         Ok(())
     }
 
@@ -195,10 +209,11 @@ impl CampaignSpec {
         angles
     }
 
-    /// The base on one of the beds: the first, then the others, then those of other depths.
+    /// The base on one of the beds: the first, then the others, then those of other depths, for stops and then for flows.
     fn on_bed(&self, bed: usize) -> InclineSpec {
         let mut spec = self.base.clone();
-        let others = self.other_beds.iter().chain(&self.depths);
+        let of_flows = self.flows_of_depth.iter().map(|f| &f.bed);
+        let others = self.other_beds.iter().chain(&self.depths).chain(of_flows);
         if let Some(other) = bed.checked_sub(1).and_then(|k| others.clone().nth(k)) {
             spec.domain = other.domain;
             spec.bed = other.grains.clone();
@@ -215,6 +230,14 @@ impl CampaignSpec {
     pub(super) fn depth_beds(&self) -> std::ops::Range<usize> {
         let first = 1 + self.other_beds.len();
         first..first + self.depths.len()
+    }
+
+    /// Slopes and beds of the flows of other depths.
+    pub(super) fn flows_elsewhere(&self) -> Vec<(f64, usize)> {
+        let first = self.depth_beds().end;
+        let beds = self.flows_of_depth.iter().enumerate();
+        beds.flat_map(|(k, f)| f.slopes_degrees.iter().map(move |s| (*s, first + k)))
+            .collect()
     }
 
     pub(super) fn flow_run(&self, angle: f64, bed: usize) -> InclineSpec {
@@ -275,6 +298,12 @@ impl CampaignSpec {
         let full = flows * self.flow_beds as f64 + searches * beds;
         let shallow: usize = self.depths.iter().map(|bed| bed.grains.len()).sum();
         let depths = runs(&self.stop) * steps(self.search_time) * shallow as f64;
-        (full * self.base.bed.len() as f64 + depths) as u64
+        let elsewhere: usize = self
+            .flows_of_depth
+            .iter()
+            .map(|f| f.bed.grains.len() * f.slopes_degrees.len())
+            .sum();
+        let elsewhere = elsewhere as f64 * steps(self.base.max_time);
+        (full * self.base.bed.len() as f64 + depths + elsewhere) as u64
     }
 }

@@ -2,11 +2,13 @@
 
 use super::CampaignSpec;
 use super::candidates::Candidates;
-use super::causes::{causes, inherited, laws};
+use super::causes::{causes, inherited, joint_laws, laws};
 use super::search::NoBracket;
 use super::threshold::{NonLocal, Threshold};
 use crate::calibration::thesis::{Estimator, EstimatorFit, Row, published_row};
-use crate::calibration::{Alternative, FitError, LocalPoint, MuIFit, Posterior, ResidualTests};
+use crate::calibration::{
+    Alternative, FitError, JointComparison, LocalPoint, MuIFit, Posterior, ResidualTests,
+};
 use crate::incline::InclineResult;
 use serde::{Deserialize, Serialize};
 
@@ -32,6 +34,7 @@ pub(super) struct Evidence<'a> {
     pub non_local: &'a Option<NonLocal>,
     pub residuals: &'a Option<ResidualTests>,
     pub alternatives: &'a [Alternative],
+    pub joint: &'a Option<JointComparison>,
     pub posterior: &'a Option<Posterior>,
     pub points: &'a [LocalPoint],
     pub candidates: Candidates<'a>,
@@ -58,6 +61,7 @@ pub(super) fn judge(e: &Evidence) -> Verdict {
         }
     }
     laws(e.alternatives, e.points, &mut text);
+    text.extend(e.joint.as_ref().and_then(joint_laws));
     causes(e, &mut good, &mut text);
     e.candidates.tell(&mut text);
     if let Ok(fit) = e.fit_zz {

@@ -28,10 +28,11 @@ pub struct Report {
     /// Velocity of the continuum minus that of the grains at the handshake surface m, over that of the grains.
     /// To be below 1 %.
     pub slip: f64,
-    /// Shear stress of the grains over that of the continuum at m. To be within 5 %.
-    pub shear_ratio: f64,
-    /// Pressure of the grains over that of the continuum at m. To be within 5 %.
-    pub pressure_ratio: f64,
+    /// Shear stress of the grains over that of the continuum at m; none where the continuum has none there but for
+    /// round-off, as beside grains that do not act on it. To be within 5 %.
+    pub shear_ratio: Option<f64>,
+    /// Pressure of the grains over that of the continuum at m, likewise. To be within 5 %.
+    pub pressure_ratio: Option<f64>,
     /// Density of the grains between a and m (kg/m³).
     pub inner_density: f64,
     /// The same between m and b; the outermost layer is never full.
@@ -44,6 +45,15 @@ pub struct Report {
     pub escaped: f64,
     /// Impulse of relaxation over that of the shear traction on the edge. To be below 10 %.
     pub relaxation_share: f64,
+}
+
+/// Share of the pressure below which a stress is round-off.
+const NO_STRESS: f64 = 1e-12;
+
+/// Grains over continuum.
+fn ratio_of_stresses([grains, continuum]: [f64; 2], pressure: [f64; 2]) -> Option<f64> {
+    let largest = pressure[0].abs().max(pressure[1].abs());
+    (continuum.abs() > NO_STRESS * largest).then(|| grains / continuum)
 }
 
 impl Monitors {
@@ -92,8 +102,8 @@ impl Monitors {
         let mean = |sum: f64| ratio(sum, self.count);
         Report {
             slip: ratio(self.slip, self.velocity),
-            shear_ratio: ratio(self.shear[0], self.shear[1]),
-            pressure_ratio: ratio(self.pressure[0], self.pressure[1]),
+            shear_ratio: ratio_of_stresses(self.shear, self.pressure),
+            pressure_ratio: ratio_of_stresses(self.pressure, self.pressure),
             inner_density: mean(self.density[0]),
             buffer_density: mean(self.density[1]),
             inner_temperature: mean(self.temperature[0]),
@@ -150,5 +160,30 @@ impl Monitors {
             relaxation,
             interface,
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_stress_of_round_off_has_no_ratio() {
+        let with = |shear, pressure| {
+            let monitors = Monitors {
+                count: 1.0,
+                shear,
+                pressure,
+                ..Monitors::default()
+            };
+            let report = monitors.report();
+            (report.shear_ratio, report.pressure_ratio)
+        };
+        assert_eq!(with([30.0, 40.0], [50.0, 100.0]), (Some(0.75), Some(0.5)));
+        assert_eq!(with([30.0, -2e-15], [50.0, 100.0]), (None, Some(0.5)));
+        assert_eq!(with([30.0, 0.0], [50.0, 0.0]), (None, None));
+        // Little is not nothing.
+        assert_eq!(with([30.0, 1e-6], [50.0, 100.0]).0, Some(3e7));
+        assert_eq!(with([0.0; 2], [0.0; 2]), (None, None));
     }
 }

@@ -8,7 +8,7 @@ use crate::state_hash;
 use crate::summary::{Quantity, Summary};
 use crate::table::Table;
 use colluvium_coupling::calibration::thesis::{Estimator, published_row};
-use colluvium_coupling::calibration::{LeftOut, Stress};
+use colluvium_coupling::calibration::{Fraction, LeftOut, Stress};
 use colluvium_coupling::campaign::Threshold;
 use colluvium_coupling::incline::{InclineResult, Outcome, Purpose, Start};
 
@@ -125,6 +125,20 @@ pub(super) fn summarise(scene: &Scene, record: &Campaign) -> Summary {
             &name,
             Quantity::new(a.weight, "1").from("Akaike weight of the law"),
         );
+    }
+    if let Some(joint) = &result.joint {
+        let names = ["constant_phi", "phi_of_i", "dilatancy"];
+        let source = "Akaike weight of μ(I) with this solid fraction, on μ and φ together, all laws of friction";
+        for (name, weight) in names.iter().zip(joint.weights) {
+            let value = Quantity::new(weight, "1").from(source);
+            summary.put(&format!("weight_{name}"), value);
+        }
+        let with = joint.best(Fraction::Dilatancy);
+        if let Some([k, error]) = with.and_then(|a| a.dilatancy) {
+            let source = "K of μ = μ(I) + K (φ − φ(I)), of the best such law";
+            let value = Quantity::new(k, "1").with_error(error);
+            summary.put("dilatancy", value.from(source));
+        }
     }
     if let Some(fit) = &result.fluidity {
         let source = "Akaike weight of non-local fluidity against the local law, on profiles through the depth";

@@ -186,6 +186,11 @@ pub struct CalibrationKeys {
     #[serde(default = "seven")]
     #[schemars(extend("minimum" = 4, "maximum" = 60))]
     pub flow_count: u64,
+    /// Depths, as factors of the depth, that such flows may have besides the full one: their number, slopes and depths are chosen
+    /// for most information at the cost of `flow_count` full flows. None: all are of the full depth.
+    #[serde(default, skip_serializing_if = "Vec::is_empty")]
+    #[schemars(extend("minItems" = 0, "maxItems" = 20, "items" = {"type": "number", "minimum": 0.05, "maximum": 4.0}))]
+    pub depth_choices: Vec<f64>,
     /// Beds of different seeds that the searches try at each slope: one alone leaves ±2 degrees.
     #[serde(default = "one")]
     #[schemars(extend("minimum" = 1, "maximum" = 64))]
@@ -427,6 +432,15 @@ impl InclineScene {
                 "calibration.flow_beds",
                 self.calibration.flow_beds as f64,
                 format!("[1, {}], at most calibration.beds", self.calibration.beds),
+            );
+        }
+        let calibration = &self.calibration;
+        if !calibration.depth_choices.is_empty() && !calibration.flow_degrees.is_empty() {
+            return out_of_range(
+                "calibration.depth_choices",
+                calibration.depth_choices[0],
+                "none where calibration.flow_degrees names the flows; flow_degrees = [] lets slopes and depths be chosen"
+                    .to_owned(),
             );
         }
         let guess = self.calibration.guess;

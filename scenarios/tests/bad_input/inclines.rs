@@ -142,6 +142,24 @@ pub const CASES: &[Case] = &[
     ),
     (
         &[
+            "calibrate",
+            "incline-moderate",
+            "--set",
+            "calibration.depth_choices=[0.5]",
+        ],
+        &["calibration.depth_choices", "0.5", "flow_degrees = []"],
+    ),
+    (
+        &[
+            "calibrate",
+            "incline-moderate",
+            "--set",
+            "calibration.depth_choices=[5.0]",
+        ],
+        &["calibration.depth_choices[0]", "5", "4"],
+    ),
+    (
+        &[
             "run",
             "incline-moderate",
             "--set",

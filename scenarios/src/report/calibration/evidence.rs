@@ -3,7 +3,7 @@
 use super::super::page::{figure, number, with_error};
 use super::super::plot::{Mark, Plot};
 use super::{Campaign, HEIGHT, WIDTH};
-use colluvium_coupling::calibration::FluidityFit;
+use colluvium_coupling::calibration::{FluidityFit, Fraction, JointAlternative, JointComparison};
 use colluvium_coupling::campaign::Threshold;
 use maud::{Markup, html};
 
@@ -35,6 +35,7 @@ pub(super) fn evidence(campaign: &Campaign) -> Markup {
                 }
             } }
         }
+        @if let Some(joint) = &result.joint { (joint_laws(joint)) }
         @if let Some(fit) = &result.fluidity { (fluidity(fit)) }
         @if let Some(r) = &result.residuals {
             h3 { "Are the residuals noise?" }
@@ -66,6 +67,44 @@ pub(super) fn evidence(campaign: &Campaign) -> Markup {
                 @if let Some(t) = &result.onset { (threshold("onset", t, campaign.diameter)) }
             }
         }
+    }
+}
+
+/// Laws of friction and solid fraction together.
+fn joint_laws(joint: &JointComparison) -> Markup {
+    let d = &joint.deviation;
+    let beside = |a: &JointAlternative| match (a.fraction, a.dilatancy) {
+        (Fraction::Dilatancy, Some([k, error])) => format!(", K = {}", with_error(k, error)),
+        (Fraction::Dilatancy, None) => ", K = 0".to_owned(),
+        _ => String::new(),
+    };
+    html! {
+        h3 { "Friction and solid fraction together" }
+        p {
+            "Each layer's μ and φ against one φ, φ(I) = φ_0 − s I, and φ(I) with dilatancy, μ = μ(I) + K (φ − φ(I)), K ≥ 0 (Roux and "
+            "Radjai 1998; Pailha and Pouliquen 2009). The criterion is the sum of that of φ for given I and that of μ for given I and φ; "
+            "ĉ = " (number(joint.scatter[0])) " and " (number(joint.scatter[1])) ". Beside φ(I) flows differ by " (number(d.flows))
+            " and layers by " (number(d.layers)) " more than the " (number(d.counting)) " that counting errs by; only that enters K."
+        }
+        table {
+            tr { th.text { "solid fraction" } th { "weight, all laws" } }
+            @for (fraction, weight) in Fraction::ALL.iter().zip(joint.weights) {
+                tr { td.text { (fraction.title()) } td { (format!("{:.1} %", 100.0 * weight)) } }
+            }
+        }
+        div.wide { table {
+            tr { th.text { "friction" } th.text { "solid fraction" } th { "χ² of μ" } th { "χ² of φ" } th { "criterion" } th { "weight" } }
+            @for a in &joint.alternatives {
+                tr {
+                    td.text { (a.friction.title()) }
+                    td.text { (a.fraction.title()) (beside(a)) }
+                    td { (format!("{:.0}", a.chi_square[0])) }
+                    td { (format!("{:.0}", a.chi_square[1])) }
+                    td { (format!("{:.1}", a.criterion)) }
+                    td { (format!("{:.1} %", 100.0 * a.weight)) }
+                }
+            }
+        } }
     }
 }
 
