@@ -180,8 +180,8 @@ pub struct MaterialEdge {
     held: Held,
     laid: Given,
     given: Given,
-    /// By how much time the first step under what is laid changed velocities (s).
-    kick: f64,
+    /// Steps that the grains had made when this was laid.
+    laid_at: u64,
     /// Impulse that the continuum has still to take from the relaxation (N s).
     owed: Vec<[f64; 2]>,
     account: Account,
@@ -287,7 +287,7 @@ impl MaterialEdge {
             },
             laid: Given::nothing(cells.count()),
             given: Given::nothing(cells.count()),
-            kick: 0.0,
+            laid_at: simulation.steps_done(),
             owed: vec![[0.0; 2]; cells.count()],
             account: Account::default(),
             monitors: Monitors::default(),
@@ -350,10 +350,7 @@ impl MaterialEdge {
 
     /// For how long what is laid has acted and is not booked yet (s).
     fn acting(&self, simulation: &Simulation) -> f64 {
-        match simulation.steps_done() % self.steps_of_loads {
-            0 => 0.0,
-            steps => self.kick + (steps - 1) as f64 * self.timestep,
-        }
+        simulation.kick_time(simulation.steps_done() - self.laid_at)
     }
 
     /// Momentum that the continuum has still to take from the relaxation (N s).
