@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 impl Joined {
     /// How far the books of mass (the handshake surface's), volume, and of both sides' momentum are from closing, when the
     /// grains were given this momentum besides what damping took.
-    fn books(&mut self, mut given: [f64; 2]) -> [f64; 4] {
+    pub fn books(&mut self, mut given: [f64; 2]) -> [f64; 4] {
         for (given, damped) in given.iter_mut().zip(self.damped) {
             *given += damped;
         }
@@ -25,7 +25,7 @@ impl Joined {
     }
 
     /// Most by which the handshake surface has moved from these places (d).
-    fn moved(&self, before: &[f64]) -> f64 {
+    pub fn moved(&self, before: &[f64]) -> f64 {
         let pairs = self.edge.handshake().iter().zip(before);
         pairs
             .map(|(x, before)| (x - before).abs())

@@ -1,8 +1,9 @@
 //! A column of grains and a plane continuum behind it, joined at an edge that moves with the material.
 //!
 //! At the start the edge is the vertical plane x = x_b. Grains lie beyond it; the continuum reaches from the wall at
-//! x = 0 to x_a, inside the grains. Each grain keeps the label ξ = x − x_b that it had at the start: labels say where
-//! in the overlap it is, however the material has deformed, and nothing ever crosses the edge. From the edge into the
+//! x = 0 to x_a, inside the grains. Each grain keeps the label ξ = x − x_b that it had at the start while it stays
+//! among its neighbours: labels say where in the overlap it is, however the material has deformed, and nothing ever crosses
+//! the edge. From the edge into the
 //! grains: *shell* ξ < b, *buffer* ξ < ξ_m, *inner overlap* ξ_m < ξ < ξ_a; totals count grains in front of the surface to
 //! which those of ξ = ξ_m have moved, the *handshake surface*, and the continuum behind it. What is exchanged is what a flat edge exchanges (see [`super`]), cell by cell:
 //!
@@ -11,7 +12,10 @@
 //!   ([`Outside`]); beyond ξ_m it is a copy of the grains, made anew at every exchange (`copy.rs`);
 //! - *on the grains*: the shell bears the continuum's traction row by row, with an impedance in its normal part
 //!   (`rows.rs`);
-//! - *on both, equal and opposite*: mean velocities of the buffer relax to each other, along x and z.
+//! - *on both, equal and opposite*: mean velocities of the buffer relax to each other, along x and z; and grains that have
+//!   come out of the edge are carried by the continuum that they lie in (`embedded.rs`).
+//!
+//! Grains that have left their neighbours get labels anew (`labels.rs`).
 //!
 //! The continuum is what is missing of the column's mass, at the solid fraction of its grains. Spins are not
 //! coupled. What lies far behind the edge and never moves need not be computed: the continuum may begin at a smooth
@@ -21,7 +25,9 @@ mod account;
 mod cells;
 mod continuum;
 mod copy;
+mod embedded;
 mod exchange;
+mod labels;
 mod memory;
 #[cfg(test)]
 mod rotation;
@@ -42,11 +48,10 @@ use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
 use colluvium_continuum::free_surface::{Outside, SurfaceOptions};
 use colluvium_dem::{GrainSample, Simulation};
 use continuum::View;
+use labels::{Labels, NO_LABEL};
 use rows::Row;
 use travel::Journey;
 
-/// Stands for the label of what has none.
-const NO_LABEL: f64 = f64::MAX;
 /// Fewest cells of continuum behind the edge.
 const LEAST_CELLS: f64 = 3.0;
 
@@ -100,31 +105,6 @@ impl MaterialEdgeSpec {
             overhang_degrees: 0.0,
             ..self.case
         }
-    }
-}
-
-/// Labels of grains: distances from the edge along x when they were given, at the start or when the edge moved on.
-#[derive(Clone, Debug, Default, PartialEq)]
-struct Labels {
-    /// By grain number; [`NO_LABEL`] for what has none (m).
-    given: Vec<f64>,
-    /// Where the edge was then, row by row (m).
-    base: Vec<f64>,
-    /// How far it has moved on since the start (m).
-    edge: f64,
-}
-
-impl Labels {
-    /// Distance of a grain's label from that of the edge (m); none of what has none.
-    fn of(&self, grain: &GrainSample) -> Option<f64> {
-        let label = self.given.get(grain.id as usize).copied();
-        label.filter(|label| *label < NO_LABEL && !grain.fixed)
-    }
-
-    /// Where the edge was at a height when labels were given (m).
-    fn base_at(&self, cells: &Cells, z: f64) -> f64 {
-        let rows = cells.rows(z).into_iter();
-        rows.map(|(row, hat)| hat * self.base[row]).sum()
     }
 }
 
