@@ -52,6 +52,8 @@ use labels::{Labels, NO_LABEL};
 use rows::Row;
 use travel::Journey;
 
+/// Exchanges longer by no more than this factor than the continuum's largest step are one step, not two halves.
+const NEARLY: f64 = 1.1;
 /// Fewest cells of continuum behind the edge.
 const LEAST_CELLS: f64 = 3.0;
 
@@ -234,7 +236,16 @@ impl MaterialEdge {
         labels: Vec<f64>,
         simulation: &Simulation,
     ) -> Result<Self, OverlapError> {
-        let collapse = Collapse::new(&spec.column(mass), &spec.options)?;
+        let steps_of_loads = Self::steps_of_loads(&spec.settings, simulation.timestep());
+        let load_time = steps_of_loads as f64 * simulation.timestep();
+        let loads = (spec.settings.exchange_time / load_time).round().max(1.0);
+        let column = spec.column(mass);
+        let exchange = loads * load_time / (column.height / column.gravity).sqrt();
+        let mut options = spec.options;
+        if exchange < NEARLY * options.largest_step {
+            options.largest_step = options.largest_step.max(exchange);
+        }
+        let collapse = Collapse::new(&column, &options)?;
         let axes = collapse.flow().grid().axes();
         let cells = Cells {
             counts: [axes[0].cells(), axes[1].cells()],
@@ -242,9 +253,6 @@ impl MaterialEdge {
             spacing: spec.spacing(),
             slab: spec.slab,
         };
-        let steps_of_loads = Self::steps_of_loads(&spec.settings, simulation.timestep());
-        let load_time = steps_of_loads as f64 * simulation.timestep();
-        let loads = (spec.settings.exchange_time / load_time).round().max(1.0);
         Ok(Self {
             cells,
             collapse,
