@@ -38,4 +38,19 @@ impl Simulation {
             0.5 * self.timestep
         }
     }
+
+    /// For how long the last steps, so many of them, have changed velocities (s): half a step less where velocities
+    /// have been given since, which belong to the time of the positions.
+    ///
+    /// ```text
+    /// t = (n − ½) Δt if 0 < n₀ ≤ n, else n Δt,      n₀ the steps since velocities were given last
+    /// ```
+    pub fn kick_time(&self, steps: u64) -> f64 {
+        let given = (1..=steps).contains(&self.steps_since_start);
+        let first = if given { 0.5 } else { 1.0 } * self.timestep;
+        match steps {
+            0 => 0.0,
+            steps => first + (steps - 1) as f64 * self.timestep,
+        }
+    }
 }

@@ -229,6 +229,14 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         most.min(by_courant).min(self.options.largest_step)
     }
 
+    /// The next step may be as long as the present velocity allows, and at most `limit`, however short the last one was:
+    /// for velocities and fractions that were set from outside.
+    pub fn renew_step(&mut self, limit: f64) {
+        if self.state.next_step > 0.0 {
+            self.state.next_step = self.allowed_step(f64::INFINITY).min(limit);
+        }
+    }
+
     /// Moves the velocity on by `dt` without moving material: the way to a steady flow whose surface
     /// stands still.
     ///

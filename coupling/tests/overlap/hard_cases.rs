@@ -9,7 +9,7 @@ use nalgebra::Vector3;
 impl Joined {
     /// How far the books of mass (the handshake surface's), volume, and of both sides' momentum are from closing, when the
     /// grains were given this momentum besides what damping took.
-    fn books(&mut self, mut given: [f64; 2]) -> [f64; 4] {
+    pub fn books(&mut self, mut given: [f64; 2]) -> [f64; 4] {
         for (given, damped) in given.iter_mut().zip(self.damped) {
             *given += damped;
         }
@@ -25,7 +25,7 @@ impl Joined {
     }
 
     /// Most by which the handshake surface has moved from these places (d).
-    fn moved(&self, before: &[f64]) -> f64 {
+    pub fn moved(&self, before: &[f64]) -> f64 {
         let pairs = self.edge.handshake().iter().zip(before);
         pairs
             .map(|(x, before)| (x - before).abs())
@@ -123,9 +123,9 @@ fn a_spray_through_the_overlap_falls_back_and_keeps_its_books() {
     assert_eq!(joined.simulation.grain_count(), count);
     assert!(highest(&joined) < HEIGHT + 1.5);
     assert!(speeds[0] < 0.1 && speeds[1] < 0.01, "{speeds:?}");
-    assert!(books[0].abs() < 0.05 && books[1].abs() < 1e-12 && books[3] < 1e-12);
-    // A throw from outside falls between two kicks of the integrator: it is known to a step's weight.
-    assert!(books[2] < 2.0 * STEP / 35.0, "{books:?}");
+    assert!(books[0].abs() < 0.05 && books[1].abs() < 1e-12);
+    // After a throw the first step changes velocities by half a step: a step's weight is 3e-5 of the whole.
+    assert!(books[2] < 1e-12 && books[3] < 1e-12, "{books:?}");
     // Without it the books are open.
     assert!(joined.books([0.0; 2])[2] > 1e-3);
 }
@@ -176,9 +176,9 @@ fn rests(stiffer: f64, lighter: f64, step: f64) {
     );
     assert!(speeds[0] < 0.1 && speeds[1] < 1e-3, "{speeds:?}");
     assert!(moved < 0.1 && monitors.escaped == 0.0);
-    assert!(books[1].abs() < 1e-12 && books[3] < 1e-12, "{books:?}");
-    // What damping took is known to a step's weight, as in a throw.
-    assert!(books[2] < 2.0 * step / 12.0, "{books:?}");
+    // The column was cut in the midst of what would be the steps between two loads since the grains' own start.
+    let closed = books[1..].iter().all(|error| error.abs() < 1e-12);
+    assert!(closed, "{books:?}");
 }
 
 /// Sound is ten times as fast, the impedance ten times as large, and loads are held a tenth as long.

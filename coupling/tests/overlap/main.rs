@@ -9,6 +9,7 @@ mod comparison;
 mod hard_cases;
 mod incline;
 mod joined;
+mod loose;
 mod material;
 mod motion;
 mod pulse;

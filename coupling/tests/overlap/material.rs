@@ -281,7 +281,7 @@ const TRAVEL: Travel = Travel {
     width: 3.0,
     rest: 0.05,
     wake: 0.06,
-    hold: 1.0,
+    hold: 0.4,
     budget: f64::INFINITY,
     fewest: 20.0,
 };
@@ -292,7 +292,7 @@ const TRAVEL: Travel = Travel {
 fn an_edge_goes_with_the_flow_and_keeps_its_books() {
     let mut joined = Joined::with_edge(false, false, 11.0, Some(TRAVEL));
     let before = joined.simulation.grain_count() as f64;
-    joined.advance(50.0, 1.0);
+    joined.advance(34.0, 1.0);
     let edge = &joined.edge;
     let [inwards, outwards] = [1.0, -1.0].map(|sign| {
         let of = edge.moves().iter().filter(|m| m.mass * sign > 0.0);

@@ -70,6 +70,8 @@ impl Bowl {
             }
         }
         self.flow.set_state(state)?;
+        self.flow
+            .renew_step(self.exchange_time() / self.units.time());
         self.account.copied += self.flow.volume() - before;
         self.view.look(&self.flow, &self.layout.cells, &self.units);
         Ok(())

@@ -52,7 +52,7 @@ impl Bowl {
     /// Books the impulses of what was laid over the steps made since.
     fn book_grains(&mut self, simulation: &Simulation) {
         self.monitors.grain_steps += simulation.grain_count() as f64 * self.steps_of_loads as f64;
-        let time = self.kick + (self.steps_of_loads - 1) as f64 * self.timestep;
+        let time = self.acting(simulation);
         for (sum, force) in self.given.relaxation.iter_mut().zip(&self.laid.relaxation) {
             *sum += force * time;
         }
@@ -91,7 +91,7 @@ impl Bowl {
 
     /// Lays the loads of the next steps.
     pub(super) fn lay(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
-        self.kick = simulation.next_kick();
+        self.laid_at = simulation.steps_done();
         self.laid.clear();
         if self.spec.settings.uncoupled {
             return Ok(());

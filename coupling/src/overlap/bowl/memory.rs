@@ -30,7 +30,7 @@ impl Bowl {
         front.extend([
             cells as f64,
             self.made as f64,
-            self.kick,
+            self.laid_at as f64,
             self.monitors.grain_steps,
         ]);
         for given in [&self.laid, &self.given] {
@@ -161,7 +161,7 @@ impl Bowl {
         bowl.monitors.grain_steps = scalars[3];
         bowl.exchanges = exchanges as u64;
         bowl.made = scalars[1] as u64;
-        bowl.kick = scalars[2];
+        bowl.laid_at = scalars[2] as u64;
         for (k, given) in [&mut bowl.laid, &mut bowl.given].into_iter().enumerate() {
             let pair = vectors(&scalars[4 + 6 * k..10 + 6 * k]);
             (given.traction, given.impedance) = (pair[0], pair[1]);

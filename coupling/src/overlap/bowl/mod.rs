@@ -256,8 +256,8 @@ pub struct Bowl {
     held: Held,
     laid: Given,
     given: Given,
-    /// By how much time the first step under what is laid changed velocities (s).
-    kick: f64,
+    /// Steps that the grains had made when this was laid.
+    laid_at: u64,
     /// Impulse that the continuum has still to take from the relaxation (N s).
     owed: Vec<Vector3<f64>>,
     /// How far grains have moved outwards through each face of the box (m).
@@ -358,7 +358,7 @@ impl Bowl {
             },
             laid: Given::nothing(count),
             given: Given::nothing(count),
-            kick: 0.0,
+            laid_at: simulation.steps_done(),
             owed: vec![Vector3::zeros(); count],
             moved: vec![0.0; sides],
             account: Account::default(),
@@ -437,10 +437,7 @@ impl Bowl {
 
     /// For how long what is laid has acted and is not booked yet (s).
     fn acting(&self, simulation: &Simulation) -> f64 {
-        match simulation.steps_done() % self.steps_of_loads {
-            0 => 0.0,
-            steps => self.kick + (steps - 1) as f64 * self.timestep,
-        }
+        simulation.kick_time(simulation.steps_done() - self.laid_at)
     }
 
     /// Momentum that the continuum has still to take from the relaxation (N s).

@@ -15,7 +15,7 @@ pub struct Account {
     pub traction: [f64; 2],
     /// Of the impedance on the grains.
     pub impedance: [f64; 2],
-    /// Of the relaxation on the grains; the continuum takes the opposite.
+    /// Of the relaxation on the grains, and of what carries those that lie in the continuum; it takes the opposite.
     pub relaxation: [f64; 2],
     /// Of the relaxation on the continuum.
     pub answer: [f64; 2],
@@ -157,10 +157,12 @@ pub struct Monitors {
     pub residual: f64,
     /// Newton iterations of the continuum's steps, and how often one was cut and tried again.
     pub newton: [f64; 2],
+    /// Labels renewed.
+    pub renewed: f64,
 }
 
 /// Numbers of the monitors.
-pub const MONITORED: usize = 15;
+pub const MONITORED: usize = 16;
 
 impl Monitors {
     /// All of it in a row of numbers.
@@ -181,6 +183,7 @@ impl Monitors {
             self.grain_steps,
             self.newton[0],
             self.newton[1],
+            self.renewed,
         ]
     }
 
@@ -198,6 +201,7 @@ impl Monitors {
             residual: n[11],
             grain_steps: n[12],
             newton: [n[13], n[14]],
+            renewed: n[15],
         }
     }
 

@@ -8,7 +8,8 @@
 //! ```
 //! and its velocity follows theirs, u += (1 − e^{−Δt/t_f}) (v̄ − u), at once on faces beside no full cell. So the
 //! surface at ξ_a moves as the grains do, no matter comes loose from it, and the copy weighs what they weigh. Volume
-//! and momentum that this adds are booked.
+//! and momentum that this adds are booked. Between two exchanges matter does come loose from the copy's end, by little and
+//! fast; it is made anew before it gets anywhere, and the next step's length must not remember how fast it was.
 
 use super::MaterialEdge;
 use super::cells::over;
@@ -72,6 +73,8 @@ impl MaterialEdge {
             }
         }
         self.collapse.set_state(state)?;
+        let exchange = self.exchange_time() / self.collapse.units().time();
+        self.collapse.flow_mut().renew_step(exchange);
         self.account.copied += self.collapse.flow().volume() - before.0;
         let now = self.continuum_momentum();
         let changes = now.iter().zip(before.1);

@@ -1,6 +1,7 @@
 //! The steps: grains under what is held, and the exchange that follows so many of them.
 
 use super::cells::over;
+use super::embedded::Embedded;
 use super::rows::{Load, Row, bearers, displacements, slopes};
 use super::{MaterialEdge, OverlapError};
 use colluvium_dem::{GrainSample, Simulation};
@@ -19,7 +20,7 @@ const BAND: f64 = 1.0;
 /// Room for what is formed and forgotten in a step.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
-    near: Vec<(GrainSample, f64)>,
+    near: Vec<(GrainSample, f64, Embedded)>,
     pub(super) shell: Vec<Load>,
     bearers: Vec<usize>,
     forces: Vec<[f64; 2]>,
@@ -39,6 +40,7 @@ impl MaterialEdge {
             self.exchange(simulation)?;
             self.made = 0;
             self.exchanges += 1;
+            self.renew_labels();
             self.travel(simulation)?;
         }
         self.lay(simulation)
@@ -47,7 +49,7 @@ impl MaterialEdge {
     /// Books the impulses of what was laid over the steps made since.
     fn book_grains(&mut self, simulation: &Simulation) {
         self.monitors.grain_steps += simulation.grain_count() as f64 * self.steps_of_loads as f64;
-        let time = self.kick + (self.steps_of_loads - 1) as f64 * self.timestep;
+        let time = self.acting(simulation);
         for (sum, force) in self.given.relaxation.iter_mut().zip(&self.laid.relaxation) {
             for (sum, force) in sum.iter_mut().zip(force) {
                 *sum += force * time;
@@ -66,31 +68,32 @@ impl MaterialEdge {
 
     /// Lays the loads of the next steps.
     pub(super) fn lay(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
-        self.kick = simulation.next_kick();
+        self.laid_at = simulation.steps_done();
         self.laid.clear();
         if self.spec.settings.uncoupled {
             return Ok(());
         }
         let (shell, buffer) = (self.spec.settings.shell, self.spec.settings.buffer);
-        let scratch = &mut self.scratch;
+        let mut scratch = std::mem::take(&mut self.scratch);
         let reach = self.held.reach;
         scratch.near.clear();
         scratch.near.extend(
             simulation
                 .held(|x| x.x < reach)
                 .filter_map(|g| self.labels.of(&g).map(|label| (g, label)))
-                .filter(|(_, label)| *label < buffer),
+                .map(|(g, label)| (g, label, self.embedded(&g)))
+                .filter(|(_, label, embedded)| *label < buffer || embedded.weight > 0.0),
         );
         // Rows may stand in another order after a restart, and sums over them end in other bits.
-        scratch.near.sort_unstable_by_key(|(grain, _)| grain.id);
+        scratch.near.sort_unstable_by_key(|(grain, ..)| grain.id);
         let rows = self.held.rows.len();
-        let weight = |grain: &GrainSample, label: f64| {
-            grain.mass * ((shell - label) / shell).clamp(0.0, 1.0)
+        let weight = |grain: &GrainSample, label: f64, embedded: &Embedded| {
+            (1.0 - embedded.weight) * grain.mass * ((shell - label) / shell).clamp(0.0, 1.0)
         };
         scratch.shell.clear();
         scratch.shell.resize(rows, Load::default());
-        for (grain, label) in &scratch.near {
-            let q = weight(grain, *label);
+        for (grain, label, embedded) in &scratch.near {
+            let q = weight(grain, *label, embedded);
             if q <= 0.0 {
                 continue;
             }
@@ -124,8 +127,10 @@ impl MaterialEdge {
             }
         }
         scratch.loads.clear();
-        for (grain, label) in &scratch.near {
-            let q = weight(grain, *label);
+        let gravity = simulation.gravity();
+        let stopping = self.embedded_time();
+        for (grain, label, embedded) in &scratch.near {
+            let q = weight(grain, *label, embedded);
             let mut force = [0.0; 2];
             if q > 0.0 {
                 for (row, hat) in self.cells.rows(grain.position.z) {
@@ -137,24 +142,28 @@ impl MaterialEdge {
                     }
                 }
             }
+            let carried = embedded.force(grain, &gravity, stopping);
+            let relaxed = if *label < buffer { grain.mass } else { 0.0 };
             for (cell, hat) in self.cells.hats(grain.position.x, grain.position.z) {
                 let laid = &mut self.laid.relaxation[cell];
                 for axis in 0..2 {
-                    let pull = grain.mass * hat * self.held.accelerations[cell][axis];
+                    let relaxed = relaxed * self.held.accelerations[cell][axis];
+                    let pull = hat * (relaxed + [carried.x, carried.z][axis]);
                     laid[axis] += pull;
                     force[axis] += pull;
                 }
             }
-            if force != [0.0; 2] {
+            if force != [0.0; 2] || carried.y != 0.0 {
                 scratch.loads.push(colluvium_dem::Load {
                     grain: grain.id,
-                    force: [force[0], 0.0, force[1]].into(),
+                    force: [force[0], carried.y, force[1]].into(),
                     moment: [0.0; 3].into(),
                 });
             }
         }
-        simulation.set_loads(&scratch.loads)?;
-        Ok(())
+        let laid = simulation.set_loads(&scratch.loads);
+        self.scratch = scratch;
+        Ok(laid?)
     }
 
     /// Averages of the grains to the continuum, its step, and what it does to the grains until the next exchange.

@@ -20,7 +20,7 @@ impl MaterialEdge {
         front.extend([
             cells,
             self.made as f64,
-            self.kick,
+            self.laid_at as f64,
             self.monitors.grain_steps,
         ]);
         for given in [&self.laid, &self.given] {
@@ -176,7 +176,7 @@ impl MaterialEdge {
         edge.monitors.grain_steps = scalars[3];
         edge.exchanges = exchanges as u64;
         edge.made = scalars[1] as u64;
-        edge.kick = scalars[2];
+        edge.laid_at = scalars[2] as u64;
         for (k, given) in [&mut edge.laid, &mut edge.given].into_iter().enumerate() {
             let n = &scalars[4 + 4 * k..];
             given.traction = [n[0], n[1]];

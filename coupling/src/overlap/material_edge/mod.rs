@@ -1,8 +1,9 @@
 //! A column of grains and a plane continuum behind it, joined at an edge that moves with the material.
 //!
 //! At the start the edge is the vertical plane x = x_b. Grains lie beyond it; the continuum reaches from the wall at
-//! x = 0 to x_a, inside the grains. Each grain keeps the label ξ = x − x_b that it had at the start: labels say where
-//! in the overlap it is, however the material has deformed, and nothing ever crosses the edge. From the edge into the
+//! x = 0 to x_a, inside the grains. Each grain keeps the label ξ = x − x_b that it had at the start while it stays
+//! among its neighbours: labels say where in the overlap it is, however the material has deformed, and nothing ever crosses
+//! the edge. From the edge into the
 //! grains: *shell* ξ < b, *buffer* ξ < ξ_m, *inner overlap* ξ_m < ξ < ξ_a; totals count grains in front of the surface to
 //! which those of ξ = ξ_m have moved, the *handshake surface*, and the continuum behind it. What is exchanged is what a flat edge exchanges (see [`super`]), cell by cell:
 //!
@@ -11,7 +12,10 @@
 //!   ([`Outside`]); beyond ξ_m it is a copy of the grains, made anew at every exchange (`copy.rs`);
 //! - *on the grains*: the shell bears the continuum's traction row by row, with an impedance in its normal part
 //!   (`rows.rs`);
-//! - *on both, equal and opposite*: mean velocities of the buffer relax to each other, along x and z.
+//! - *on both, equal and opposite*: mean velocities of the buffer relax to each other, along x and z; and grains that have
+//!   come out of the edge are carried by the continuum that they lie in (`embedded.rs`).
+//!
+//! Grains that have left their neighbours get labels anew (`labels.rs`).
 //!
 //! The continuum is what is missing of the column's mass, at the solid fraction of its grains. Spins are not
 //! coupled. What lies far behind the edge and never moves need not be computed: the continuum may begin at a smooth
@@ -21,7 +25,9 @@ mod account;
 mod cells;
 mod continuum;
 mod copy;
+mod embedded;
 mod exchange;
+mod labels;
 mod memory;
 #[cfg(test)]
 mod rotation;
@@ -42,11 +48,12 @@ use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
 use colluvium_continuum::free_surface::{Outside, SurfaceOptions};
 use colluvium_dem::{GrainSample, Simulation};
 use continuum::View;
+use labels::{Labels, NO_LABEL};
 use rows::Row;
 use travel::Journey;
 
-/// Stands for the label of what has none.
-const NO_LABEL: f64 = f64::MAX;
+/// Exchanges longer by no more than this factor than the continuum's largest step are one step, not two halves.
+const NEARLY: f64 = 1.1;
 /// Fewest cells of continuum behind the edge.
 const LEAST_CELLS: f64 = 3.0;
 
@@ -103,31 +110,6 @@ impl MaterialEdgeSpec {
     }
 }
 
-/// Labels of grains: distances from the edge along x when they were given, at the start or when the edge moved on.
-#[derive(Clone, Debug, Default, PartialEq)]
-struct Labels {
-    /// By grain number; [`NO_LABEL`] for what has none (m).
-    given: Vec<f64>,
-    /// Where the edge was then, row by row (m).
-    base: Vec<f64>,
-    /// How far it has moved on since the start (m).
-    edge: f64,
-}
-
-impl Labels {
-    /// Distance of a grain's label from that of the edge (m); none of what has none.
-    fn of(&self, grain: &GrainSample) -> Option<f64> {
-        let label = self.given.get(grain.id as usize).copied();
-        label.filter(|label| *label < NO_LABEL && !grain.fixed)
-    }
-
-    /// Where the edge was at a height when labels were given (m).
-    fn base_at(&self, cells: &Cells, z: f64) -> f64 {
-        let rows = cells.rows(z).into_iter();
-        rows.map(|(row, hat)| hat * self.base[row]).sum()
-    }
-}
-
 /// What acts on the grains until the next exchange.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Held {
@@ -180,8 +162,8 @@ pub struct MaterialEdge {
     held: Held,
     laid: Given,
     given: Given,
-    /// By how much time the first step under what is laid changed velocities (s).
-    kick: f64,
+    /// Steps that the grains had made when this was laid.
+    laid_at: u64,
     /// Impulse that the continuum has still to take from the relaxation (N s).
     owed: Vec<[f64; 2]>,
     account: Account,
@@ -254,7 +236,16 @@ impl MaterialEdge {
         labels: Vec<f64>,
         simulation: &Simulation,
     ) -> Result<Self, OverlapError> {
-        let collapse = Collapse::new(&spec.column(mass), &spec.options)?;
+        let steps_of_loads = Self::steps_of_loads(&spec.settings, simulation.timestep());
+        let load_time = steps_of_loads as f64 * simulation.timestep();
+        let loads = (spec.settings.exchange_time / load_time).round().max(1.0);
+        let column = spec.column(mass);
+        let exchange = loads * load_time / (column.height / column.gravity).sqrt();
+        let mut options = spec.options;
+        if exchange < NEARLY * options.largest_step {
+            options.largest_step = options.largest_step.max(exchange);
+        }
+        let collapse = Collapse::new(&column, &options)?;
         let axes = collapse.flow().grid().axes();
         let cells = Cells {
             counts: [axes[0].cells(), axes[1].cells()],
@@ -262,9 +253,6 @@ impl MaterialEdge {
             spacing: spec.spacing(),
             slab: spec.slab,
         };
-        let steps_of_loads = Self::steps_of_loads(&spec.settings, simulation.timestep());
-        let load_time = steps_of_loads as f64 * simulation.timestep();
-        let loads = (spec.settings.exchange_time / load_time).round().max(1.0);
         Ok(Self {
             cells,
             collapse,
@@ -287,7 +275,7 @@ impl MaterialEdge {
             },
             laid: Given::nothing(cells.count()),
             given: Given::nothing(cells.count()),
-            kick: 0.0,
+            laid_at: simulation.steps_done(),
             owed: vec![[0.0; 2]; cells.count()],
             account: Account::default(),
             monitors: Monitors::default(),
@@ -350,10 +338,7 @@ impl MaterialEdge {
 
     /// For how long what is laid has acted and is not booked yet (s).
     fn acting(&self, simulation: &Simulation) -> f64 {
-        match simulation.steps_done() % self.steps_of_loads {
-            0 => 0.0,
-            steps => self.kick + (steps - 1) as f64 * self.timestep,
-        }
+        simulation.kick_time(simulation.steps_done() - self.laid_at)
     }
 
     /// Momentum that the continuum has still to take from the relaxation (N s).

@@ -341,6 +341,11 @@ impl JoinedColumn<'_> {
                 monitors.newton[1],
                 "of the continuum, that were halved and tried again",
             ),
+            (
+                "labels_renewed",
+                monitors.renewed,
+                "of grains that had left their neighbours in the overlap",
+            ),
         ] {
             summary.put(name, Quantity::new(value, "1").from(source));
         }
