@@ -16,7 +16,7 @@ use super::topology::{NONE, Topology};
 use crate::discretisation::{
     COMPONENTS, Discretisation, Parts, QuadraturePoint, VELOCITIES, VelocityAt, add_corner_shear,
 };
-use crate::grid::{Axis, DIMENSIONS, Grid, flatten, unflatten};
+use crate::grid::{Axis, Boundary, DIMENSIONS, Grid, flatten, unflatten};
 use crate::linear_solver::Place;
 use crate::strain::{shear_row, stretching};
 use crate::wall_friction::{PointLaw, SideWalls};
@@ -260,9 +260,10 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 continue;
             }
             let mut point = QuadraturePoint::new(volume * self.grid.cell_volume());
+            let part = self.part_beside_wall(at);
             for axis in 0..D {
                 for &(row, orientation) in stretching::<D>(axis) {
-                    self.add_stretching(cell, axis, row, orientation, &mut point);
+                    self.add_stretching(cell, axis, row, part * orientation, &mut point);
                 }
             }
             if !self.add_shear_at_edge(at, &mut point) {
@@ -282,6 +283,9 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                             row,
                             &mut point,
                         );
+                        if part < 1.0 && ![low, high].iter().any(|&axis| self.sticks(axis, at)) {
+                            point.scale_rate(row, part);
+                        }
                     }
                 }
             }
@@ -332,6 +336,24 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             point.pressure_offset = 0.5 * thickness * weight_onto(&self.acceleration, axis, side);
         }
         (volume > 0.0 && !point.velocities().is_empty()).then_some(point)
+    }
+
+    /// Whether a corner lies on a wall across an axis to which material sticks.
+    fn sticks(&self, axis: usize, corner: [usize; D]) -> bool {
+        matches!(
+            self.grid.axes()[axis].boundary_at(corner[axis]),
+            Some(Boundary::NoSlip { .. } | Boundary::LoadedWall { .. })
+        )
+    }
+
+    /// How much of what a cell stretches, and shears in the plane of a wall, there is in the quarter of it at a
+    /// corner. Along a wall to which material sticks nothing stretches, and in the middle of the quarter half as
+    /// much as at the centre of the cell. All of it would take up what the material can bear and leave less traction
+    /// for the wall: an error of first order in the cell size where what stretches comes to rest along a
+    /// wall, as under the front of a collapse.
+    fn part_beside_wall(&self, corner: [usize; D]) -> f64 {
+        let sticks = (0..D).any(|axis| self.sticks(axis, corner));
+        if sticks { 0.5 } else { 1.0 }
     }
 
     /// At a corner on a rough wall the traction acts on the whole face, however thin the layer:
