@@ -41,7 +41,7 @@ pub struct CollapseCase<L = MuI> {
 }
 
 /// Height of the grid over the height of the column.
-const ROOM_ABOVE: f64 = 1.25;
+pub(crate) const ROOM_ABOVE: f64 = 1.25;
 /// Fewest cells across the height or the width of the column.
 const FEWEST_CELLS: f64 = 4.0;
 /// Material counts as at rest when nothing moves faster than this many ε H.
@@ -141,7 +141,7 @@ impl<L: ShearLaw + Clone> CollapseCase<L> {
 impl<L> CollapseCase<L> {
     /// Share of a cell of the grid that the column covers: below its top, and behind its face, which leans out
     /// by `tan θ` a unit of height. Exact: the mean over the covered rows of `clamp(x_face(z)/h - i, 0, 1)`.
-    fn covered(&self, spacing: f64, i: usize, k: usize) -> f64 {
+    pub(crate) fn covered(&self, spacing: f64, i: usize, k: usize) -> f64 {
         let high = (1.0 / spacing - k as f64).clamp(0.0, 1.0);
         if high == 0.0 {
             return 0.0;
@@ -171,6 +171,24 @@ pub struct Front {
     pub position: f64,
     /// Greatest height of the heap (m).
     pub height: f64,
+}
+
+impl Front {
+    /// The front of a heap of these heights at these places.
+    pub(crate) fn of_profile(time: f64, x: &[f64], h: &[f64], threshold: f64) -> Self {
+        let height = h.iter().fold(0.0_f64, |most, h| most.max(*h));
+        let last = (0..h.len()).rev().find(|&i| h[i] >= threshold);
+        let position = match last {
+            None => 0.0,
+            Some(i) if i + 1 == h.len() => x[i],
+            Some(i) => x[i] + (x[i + 1] - x[i]) * (h[i] - threshold) / (h[i] - h[i + 1]),
+        };
+        Self {
+            time,
+            position,
+            height,
+        }
+    }
 }
 
 /// A collapse under way.
@@ -424,17 +442,6 @@ impl<L: ShearLaw + Clone> Collapse<L> {
     /// Where the heap reaches down to a height (m).
     pub fn front(&self, threshold: f64) -> Front {
         let (x, h) = self.profile();
-        let height = h.iter().fold(0.0_f64, |most, h| most.max(*h));
-        let last = (0..h.len()).rev().find(|&i| h[i] >= threshold);
-        let position = match last {
-            None => 0.0,
-            Some(i) if i + 1 == h.len() => x[i],
-            Some(i) => x[i] + (x[i + 1] - x[i]) * (h[i] - threshold) / (h[i] - h[i + 1]),
-        };
-        Front {
-            time: self.time(),
-            position,
-            height,
-        }
+        Front::of_profile(self.time(), &x, &h, threshold)
     }
 }

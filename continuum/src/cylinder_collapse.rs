@@ -1,4 +1,4 @@
-//! Collapse of an upright cylinder of granular matter on a rough floor, in space.
+//! Collapse of an upright cylinder of granular matter on a floor, in space.
 //!
 //! A cylinder of height H and radius r_0 = H/a is let go at t = 0. What is asked for is how far it runs
 //! out, (r_f − r_0)/r_0, and what deposit it leaves, as a function of the aspect ratio a. Experiments find
@@ -11,7 +11,9 @@
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, require};
-use crate::free_surface::{SpaceFields, SpaceFlow, SpaceState, SurfaceOptions, SurfaceStep};
+use crate::free_surface::{
+    Contact, SpaceFields, SpaceFlow, SpaceState, SurfaceOptions, SurfaceStep,
+};
 use crate::grid::{Axis, Boundary, Grid};
 use crate::rheology::{MuI, Rheology};
 use crate::units::Units;
@@ -34,6 +36,9 @@ pub struct CylinderCase {
     pub length_scaled: f64,
     /// Whether the grid holds the whole cylinder, instead of a quarter between planes of symmetry.
     pub whole: bool,
+    /// What holds on the floor.
+    #[serde(default)]
+    pub floor: Contact,
 }
 
 /// Height of the grid over the height of the cylinder.
@@ -75,6 +80,9 @@ impl CylinderCase {
     /// [`Error::OutOfRange`] with the key, the value and the allowed range.
     pub fn validate(&self) -> Result<(), Error> {
         self.rheology.validate()?;
+        if let Contact::Coulomb(friction) = self.floor {
+            friction.validate()?;
+        }
         for (key, value) in [
             ("aspect", self.aspect),
             ("height", self.height),
@@ -141,7 +149,7 @@ impl CylinderCase {
         let grid = Grid::with_moving_surface([
             axis(columns, Boundary::FreeSlip),
             axis(columns, Boundary::FreeSlip),
-            axis(rows, Boundary::NoSlip { velocity: 0.0 }),
+            axis(rows, self.floor.on_wall().in_units(&self.units())),
         ])?;
         let radius = 1.0 / (self.aspect * spacing);
         let mut layer = Vec::with_capacity(columns * columns);

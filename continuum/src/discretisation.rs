@@ -80,6 +80,14 @@ impl<const C: usize, const V: usize> QuadraturePoint<C, V> {
         self.rates[component][slot] += coefficient;
     }
 
+    /// Multiplies a component of the strain rate.
+    pub(crate) fn scale_rate(&mut self, component: usize, factor: f64) {
+        for rate in &mut self.rates[component] {
+            *rate *= factor;
+        }
+        self.offset[component] *= factor;
+    }
+
     /// Adds to the strain rate what a given velocity contributes.
     pub(crate) fn add_known_rate(&mut self, component: usize, rate: f64) {
         self.offset[component] += rate;

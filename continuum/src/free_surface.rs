@@ -6,7 +6,8 @@
 //! stress at once. Cells without material cost next to nothing.
 //!
 //! The same code moves material in a plane ([`SurfaceFlow`]) and in space ([`SpaceFlow`]): the number of axes
-//! is a constant of its types. Ground that cuts cells and side walls are known in a plane only.
+//! is a constant of its types. Ground that cuts cells, and walls beside it that
+//! it does not resolve, are known in a plane only.
 
 mod faces;
 mod fields;
@@ -17,6 +18,7 @@ mod open_ends;
 mod operators;
 mod outside;
 pub mod plane;
+mod sliding;
 mod topology;
 mod transport;
 

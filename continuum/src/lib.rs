@@ -41,6 +41,7 @@
 //! ```
 
 pub mod bagnold;
+pub mod channel_collapse;
 pub mod column;
 pub mod column_collapse;
 pub mod cylinder_collapse;

@@ -4,7 +4,7 @@
 
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
 use colluvium_continuum::cylinder_collapse::{CylinderCase, CylinderCollapse};
-use colluvium_continuum::free_surface::{SpaceFlow, SurfaceOptions};
+use colluvium_continuum::free_surface::{Contact, SpaceFlow, SurfaceOptions};
 use colluvium_continuum::grid::{Axis, Boundary, Grid};
 use colluvium_continuum::rheology::MuI;
 use colluvium_continuum::yield_step::LinearSolver;
@@ -36,6 +36,7 @@ fn cylinder(cells: usize, options: &SurfaceOptions) -> CylinderCollapse {
         cells,
         length_scaled: 2.9,
         whole: false,
+        floor: Contact::NoSlip,
     };
     CylinderCollapse::new(&case, options).unwrap()
 }

@@ -5,7 +5,7 @@
 
 use colluvium_continuum::cylinder_collapse::{CylinderCase, CylinderCollapse};
 use colluvium_continuum::free_surface::plane::Plane;
-use colluvium_continuum::free_surface::{SpaceFlow, SurfaceFlow, SurfaceOptions};
+use colluvium_continuum::free_surface::{Contact, SpaceFlow, SurfaceFlow, SurfaceOptions};
 use colluvium_continuum::grid::{Axis, Boundary, Grid};
 use colluvium_continuum::rheology::MuI;
 use colluvium_continuum::yield_step::PrimalDualOptions;
@@ -232,6 +232,7 @@ fn cylinder(aspect: f64, cells: usize, rheology: MuI) -> CylinderCase {
         cells,
         length_scaled: (1.0 + 1.9 * aspect) / aspect,
         whole: false,
+        floor: Contact::NoSlip,
     }
 }
 

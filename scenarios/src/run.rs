@@ -5,6 +5,7 @@ pub mod bagnold;
 pub mod ball_impact;
 pub mod bed;
 mod boulder;
+pub mod channel;
 pub mod chute;
 pub mod cliff;
 pub mod collapse;

@@ -19,6 +19,7 @@ mod collapse_grains;
 mod collapse_terrain;
 mod collapse_zones;
 mod comet;
+mod contact;
 mod cylinder;
 mod error;
 mod friction_keys;
@@ -48,12 +49,14 @@ pub use chute::ChuteScene;
 pub use cliff::{CliffCrackKeys, CliffModel, CliffScene, CliffShapeKeys};
 pub use cliff_runout::CliffRunoutKeys;
 pub use collapse::{
-    CollapseGrid, CollapseModel, CollapseScene, CollapseSolver, CollapseWalls, ThinLayerKind,
+    ChannelKeys, CollapseGrid, CollapseModel, CollapseScene, CollapseSolver, CollapseWalls,
+    ThinLayerKind,
 };
 pub use collapse_grains::{CalibratedKind, ColumnFloorKind, ColumnGrainKeys};
 pub use collapse_terrain::{ContactKind, TerrainKeys};
 pub use collapse_zones::{ColumnOverlapKeys, ColumnZoneKeys, DENSE};
 pub use comet::{CometBlockKeys, CometKeys, MixKind, Softness};
+pub use contact::SurfaceKeys;
 pub use cylinder::{CylinderGrid, CylinderScene};
 pub use error::SceneError;
 pub use friction_law::LawVisitor;

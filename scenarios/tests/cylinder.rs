@@ -102,3 +102,83 @@ fn cylinders_are_planned_and_bad_ones_refused_by_key() {
         assert!(!folder.path().join("x").exists());
     }
 }
+
+/// On a floor of little friction the cylinder slides farther than where it stands still at the floor.
+#[test]
+fn cylinder_slides_on_a_floor_of_little_friction() {
+    let folder = tempfile::tempdir().unwrap();
+    let runout = |out: &str, floor: &str| {
+        let list = [
+            "run",
+            "cylinder-collapse",
+            "--out",
+            out,
+            "--set",
+            "scale=0.5",
+        ];
+        succeed(folder.path(), &[&list[..], &["--set", floor]].concat());
+        let found = summary(&folder.path().join(out));
+        assert!(value(&found, "volume_error").abs() < 1e-12);
+        assert!(value(&found, "symmetry_error") < 1e-8);
+        value(&found, "runout_scaled")
+    };
+    let rough = runout("rough", "floor.contact=\"no-slip\"");
+    let sliding = runout("sliding", "floor={contact=\"coulomb\",friction=0.2}");
+    assert!(sliding > 1.1 * rough, "{rough} {sliding}");
+}
+
+/// A column in a channel in space: rubbing walls hold it back, most beside them; smooth ones do not.
+#[test]
+fn column_in_a_channel_with_walls_in_space() {
+    let folder = tempfile::tempdir().unwrap();
+    let run = |out: &str, contact: &str| {
+        let walls = format!(
+            "side_walls={{width=0.5,friction=0.3,in_space={{cells=4,contact=\"{contact}\"}}}}"
+        );
+        let list = [
+            "run",
+            "column-collapse",
+            "--out",
+            out,
+            "--set",
+            "scale=0.25",
+        ];
+        let list = [&list[..], &["--set", "aspect=0.8", "--set", &walls]].concat();
+        succeed(folder.path(), &list);
+        summary(&folder.path().join(out))
+    };
+    let rubbing = run("rubbing", "coulomb");
+    let smooth = run("smooth", "free-slip");
+    let (header, fronts) = table(&folder.path().join("rubbing/front.csv"));
+    assert_eq!(header, ["t", "x_front", "height", "x_at_wall", "x_inside"]);
+    assert!(fronts.len() > 20);
+    for found in [&rubbing, &smooth] {
+        assert_eq!(found["status"], "done");
+        assert!(value(found, "volume_error").abs() < 1e-12);
+    }
+    let [held, free] = [&rubbing, &smooth].map(|found| value(found, "runout_scaled"));
+    assert!(held > 0.3 && held < 0.9 * free, "{held} {free}");
+    assert!(value(&rubbing, "front_lag") >= 0.0 && value(&smooth, "front_lag").abs() < 1e-6);
+    for (set, key, allowed) in [
+        (
+            "side_walls={width=0.5,friction=0.3,in_space={cells=2,floor={contact=\"coulomb\"}}}",
+            "side_walls.in_space.floor.friction",
+            "coulomb",
+        ),
+        (
+            "side_walls={width=0.5,friction=0.3,in_space={cells=0}}",
+            "side_walls.in_space.cells",
+            "1",
+        ),
+    ] {
+        let arguments = ["run", "column-collapse", "--out", "x", "--set", set];
+        let refused = colluvium(folder.path(), &arguments);
+        assert_eq!(refused.status.code(), Some(2), "{set}");
+        let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+        assert!(
+            message.contains(key) && message.contains(allowed),
+            "{set}: {message}"
+        );
+        assert!(!folder.path().join("x").exists());
+    }
+}

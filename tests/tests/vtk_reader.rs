@@ -9,7 +9,7 @@ use colluvium::frames;
 use colluvium::run::cylinder;
 use colluvium::vtkhdf;
 use colluvium_continuum::cylinder_collapse::{CylinderCase, CylinderCollapse};
-use colluvium_continuum::free_surface::SurfaceOptions;
+use colluvium_continuum::free_surface::{Contact, SurfaceOptions};
 use colluvium_continuum::rheology::MuI;
 use colluvium_dem::{
     Body, Clump, ContactLaw, Domain, Grain, Hooke, Part, Pose, Setup, Simulation, Snapshot,
@@ -420,6 +420,7 @@ fn vtk_reads_hexahedra_through_time() {
         cells: 9,
         length_scaled: 2.9,
         whole: false,
+        floor: Contact::NoSlip,
     };
     let mut collapse = CylinderCollapse::new(&case, &SurfaceOptions::default()).unwrap();
     let frames: Vec<vtkhdf::Frame> = (0..3)

@@ -11,7 +11,7 @@ use std::process::Command;
 
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
 use colluvium_continuum::cylinder_collapse::{CylinderCase, CylinderCollapse};
-use colluvium_continuum::free_surface::{SurfaceOptions, SurfaceStep};
+use colluvium_continuum::free_surface::{Contact, SurfaceOptions, SurfaceStep};
 use colluvium_continuum::rheology::MuI;
 use colluvium_continuum::yield_step::LinearSolver;
 
@@ -90,6 +90,7 @@ fn run(flow: &str, end: f64, tolerance: f64, cells: usize, solver: LinearSolver)
                 cells,
                 length_scaled: 2.9,
                 whole: false,
+                floor: Contact::NoSlip,
             };
             let mut collapse = CylinderCollapse::new(&case, &options)?;
             while collapse.time() < end - 1e-9 {

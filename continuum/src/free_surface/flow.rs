@@ -17,6 +17,7 @@ use super::open_ends::Inflow;
 use super::operators::{Material, Operators};
 use super::outside::Outside;
 use super::plane::Plane;
+use super::sliding::SlidingPlaces;
 use super::topology::{NONE, Topology};
 use super::transport::{MASSLESS, Motion, Transport};
 use crate::discretisation::{COMPONENTS, VELOCITIES};
@@ -71,6 +72,7 @@ pub struct SurfaceFlow<
     planes: Vec<Option<Plane>>,
     transport: Transport<D>,
     side_walls: Option<SideWalls>,
+    sliding: SlidingPlaces<D>,
     bed: Option<Bed<D, C, V>>,
     /// What acts from outside.
     outside: Option<Outside<D, C>>,

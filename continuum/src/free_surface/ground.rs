@@ -28,18 +28,22 @@ mod operators;
 mod points;
 mod transport;
 
+use serde::{Deserialize, Serialize};
+
 use super::operators::POINTS;
 use super::plane::Plane;
 use super::topology::{NONE, Topology};
 use crate::error::{Error, require};
-use crate::grid::{Axis, DIMENSIONS, Grid};
+use crate::grid::{Axis, Boundary, DIMENSIONS, Grid};
 use crate::terrain::{CutCells, GridLines, Profile};
 use crate::wall_friction::WallFriction;
 
-/// What holds on the surface of ground.
-#[derive(Debug, Clone, Copy, PartialEq)]
+/// What holds on the surface of ground, or on a wall.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
+#[serde(rename_all = "kebab-case")]
 pub enum Contact {
     /// Matter at the ground stands still.
+    #[default]
     NoSlip,
     /// It slides once the ground bears all the shear stress it can.
     Coulomb(WallFriction),
@@ -51,6 +55,18 @@ impl Contact {
     /// Whether matter at the ground has a velocity.
     pub(crate) fn slides(self) -> bool {
         self != Contact::NoSlip
+    }
+
+    /// The same on a wall of the grid, at rest.
+    pub(crate) fn on_wall(self) -> Boundary {
+        match self {
+            Contact::NoSlip => Boundary::NoSlip { velocity: 0.0 },
+            Contact::Coulomb(friction) => Boundary::CoulombWall {
+                velocity: 0.0,
+                friction,
+            },
+            Contact::FreeSlip => Boundary::FreeSlip,
+        }
     }
 }
 

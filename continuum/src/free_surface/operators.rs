@@ -12,11 +12,12 @@ use super::fraction::volume_in;
 use super::open_ends::Inflow;
 use super::outside::Outside;
 use super::plane::Plane;
+use super::sliding::SlidingPlaces;
 use super::topology::{NONE, Topology};
 use crate::discretisation::{
     COMPONENTS, Discretisation, Parts, QuadraturePoint, VELOCITIES, VelocityAt, add_corner_shear,
 };
-use crate::grid::{Axis, DIMENSIONS, Grid, flatten, unflatten};
+use crate::grid::{Axis, Boundary, DIMENSIONS, Grid, flatten, unflatten};
 use crate::linear_solver::Place;
 use crate::strain::{shear_row, stretching};
 use crate::wall_friction::{PointLaw, SideWalls};
@@ -52,10 +53,12 @@ pub(crate) struct Material<'a, const D: usize = DIMENSIONS, const C: usize = COM
     pub acceleration: [f64; D],
     /// What lies beyond the surface, if it is not free.
     pub outside: Option<&'a Outside<D, C>>,
+    /// Where the tractions of walls are kept along which material slides.
+    pub sliding: &'a SlidingPlaces<D>,
 }
 
 /// The operators, and the place of each quadrature point on the grid: cell times [`points_of`] plus
-/// corner, and the points of side walls after those of all cells.
+/// corner, and the points of walls after those of all cells.
 pub(crate) struct Operators<
     const D: usize = DIMENSIONS,
     const C: usize = COMPONENTS,
@@ -252,22 +255,30 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                     places.push((self.fractions.len() + cell) * points_of(D) + corner);
                 }
             }
+            let filled = || volume_in(self.fractions[cell], self.planes[cell].as_ref(), low, high);
+            if (0..D).any(|axis| self.slides(axis, at)) {
+                self.add_sliding(cell, index, side, [filled(), share], points, places);
+            }
             let volume = match self.wall_share(at) {
                 Some(factor) => factor * share,
-                None => volume_in(self.fractions[cell], self.planes[cell].as_ref(), low, high),
+                None => filled(),
             };
             if volume <= 0.0 {
                 continue;
             }
             let mut point = QuadraturePoint::new(volume * self.grid.cell_volume());
+            let part = self.part_beside_wall(at);
             for axis in 0..D {
                 for &(row, orientation) in stretching::<D>(axis) {
-                    self.add_stretching(cell, axis, row, orientation, &mut point);
+                    self.add_stretching(cell, axis, row, part * orientation, &mut point);
                 }
             }
             if !self.add_shear_at_edge(at, &mut point) {
                 for high in 1..D {
                     for low in 0..high {
+                        if self.slides(low, at) || self.slides(high, at) {
+                            continue;
+                        }
                         // The edge through the corner: a cell along the other axes.
                         let mut edge = index;
                         edge[low] = at[low];
@@ -282,6 +293,9 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                             row,
                             &mut point,
                         );
+                        if part < 1.0 && ![low, high].iter().any(|&axis| self.sticks(axis, at)) {
+                            point.scale_rate(row, part);
+                        }
                     }
                 }
             }
@@ -334,22 +348,37 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         (volume > 0.0 && !point.velocities().is_empty()).then_some(point)
     }
 
+    /// Whether a corner lies on a wall across an axis to which material sticks.
+    fn sticks(&self, axis: usize, corner: [usize; D]) -> bool {
+        matches!(
+            self.grid.axes()[axis].boundary_at(corner[axis]),
+            Some(Boundary::NoSlip { .. } | Boundary::LoadedWall { .. })
+        )
+    }
+
+    /// How much of what a cell stretches, and shears in the plane of a wall, there is in the quarter of it at a
+    /// corner. Along a wall to which material sticks nothing stretches, and in the middle of the quarter half as
+    /// much as at the centre of the cell. All of it would take up what the material can bear and leave less traction
+    /// for the wall: an error of first order in the cell size where what stretches comes to rest along a
+    /// wall, as under the front of a collapse.
+    fn part_beside_wall(&self, corner: [usize; D]) -> f64 {
+        let sticks = (0..D).any(|axis| self.sticks(axis, corner));
+        if sticks { 0.5 } else { 1.0 }
+    }
+
     /// At a corner on a rough wall the traction acts on the whole face, however thin the layer:
     /// the factor by which the points there count, so that they do as long as one of the cells
     /// holds material.
     fn wall_share(&self, corner: [usize; D]) -> Option<f64> {
-        let axes = self.grid.axes();
-        let rough = (0..D).any(|axis| {
-            axes[axis]
-                .boundary_at(corner[axis])
-                .is_some_and(|side| side.wall_velocity().is_some())
-        });
+        if !(0..D).any(|axis| self.sticks(axis, corner)) {
+            return None;
+        }
         let (mut all, mut filled) = (0, 0);
         for cell in self.cells_at_corner(corner) {
             all += 1;
             filled += usize::from(self.fractions[cell] > EMPTY);
         }
-        (rough && filled > 0).then(|| all as f64 / filled as f64)
+        (filled > 0).then(|| all as f64 / filled as f64)
     }
 
     /// The cells around a corner that lie on the grid, x fastest; along a flat axis twice the same.
@@ -496,31 +525,45 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 continue;
             };
             let side = usize::from(corner[axis] > 0);
-            let spacing = axes[axis].spacing();
-            if self.fractions[cell] <= ACTIVE {
-                let weight =
-                    weight_onto(&self.acceleration, axis, side) * self.fractions[cell] * spacing;
-                point.pressure_offset += share * (weight + self.pressure_beyond(cell, 0.0));
-                continue;
+            self.add_pressure_on_wall(cell, axis, side, share, point);
+        }
+    }
+
+    /// Adds a share of the pressure on the wall beside a cell: extrapolated from it and the one behind it, under a
+    /// thin layer the layer's weight.
+    pub(super) fn add_pressure_on_wall<const V: usize>(
+        &self,
+        cell: usize,
+        axis: usize,
+        side: usize,
+        share: f64,
+        point: &mut QuadraturePoint<C, V>,
+    ) {
+        if self.fractions[cell] <= ACTIVE {
+            let weight = weight_onto(&self.acceleration, axis, side)
+                * self.fractions[cell]
+                * self.grid.axes()[axis].spacing();
+            point.pressure_offset += share * (weight + self.pressure_beyond(cell, 0.0));
+            return;
+        }
+        let first = self.faces.pressure[cell];
+        let next = self.topology.cell_neighbours[cell][axis][1 - side];
+        let factor = match next {
+            NONE => 1.0,
+            next if self.faces.pressure[next] != NONE => {
+                point.add_pressure(first, 1.5 * share);
+                point.add_pressure(self.faces.pressure[next], -0.5 * share);
+                return;
             }
-            let first = self.faces.pressure[cell];
-            let second = match self.topology.cell_neighbours[cell][axis][1 - side] {
-                NONE => Some((first, 1.0)),
-                next if self.faces.pressure[next] != NONE => Some((self.faces.pressure[next], 1.0)),
-                next => {
-                    let distance = self.surface_distance(cell, next, axis, 1 - side);
-                    Some((first, (distance - 1.0) / distance))
-                }
-            };
-            point.add_pressure(first, 1.5 * share);
-            if let Some((p, factor)) = second {
-                point.add_pressure(p, -0.5 * share * factor);
-                let next = self.topology.cell_neighbours[cell][axis][1 - side];
-                if next != NONE {
-                    let beyond = self.pressure_beyond(next, factor);
-                    point.pressure_offset -= 0.5 * share * beyond;
-                }
+            next => {
+                let distance = self.surface_distance(cell, next, axis, 1 - side);
+                (distance - 1.0) / distance
             }
+        };
+        point.add_pressure(first, 1.5 * share);
+        point.add_pressure(first, -0.5 * share * factor);
+        if next != NONE {
+            point.pressure_offset -= 0.5 * share * self.pressure_beyond(next, factor);
         }
     }
 }

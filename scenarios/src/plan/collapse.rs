@@ -4,7 +4,6 @@ use super::Lines;
 use crate::run;
 use crate::scene::CollapseScene;
 use colluvium_continuum::column_collapse::CollapseGround;
-use colluvium_continuum::free_surface::Contact;
 
 /// The plan, with the ground that the scene describes if it has any.
 pub(super) fn collapse(body: &CollapseScene, ground: Option<&CollapseGround>) -> String {
@@ -13,7 +12,7 @@ pub(super) fn collapse(body: &CollapseScene, ground: Option<&CollapseGround>) ->
     let case = run::collapse::case(body, body.rheology.mu_i());
     let units = case.units();
     let spacing = body.grid.length_scaled * body.height / case.cells as f64;
-    let column = body.section(body.height) / (spacing * spacing);
+    let mut column = body.section(body.height) / (spacing * spacing);
     lines.say(
         "scene",
         &format!(
@@ -29,16 +28,7 @@ pub(super) fn collapse(body: &CollapseScene, ground: Option<&CollapseGround>) ->
     if let Some(ground) = ground {
         let length = body.grid.length_scaled * body.height;
         let [low, high] = ground.span(length);
-        let contact = match ground.contact {
-            Contact::NoSlip => "material at it stands still".to_owned(),
-            Contact::FreeSlip => "material slides on it freely".to_owned(),
-            Contact::Coulomb(friction) => {
-                format!(
-                    "material slides on it under friction coefficient {}",
-                    friction.friction
-                )
-            }
-        };
+        let contact = run::collapse_ground::words_of(ground.contact);
         lines.say(
             "terrain",
             &format!(
@@ -47,7 +37,7 @@ pub(super) fn collapse(body: &CollapseScene, ground: Option<&CollapseGround>) ->
             ),
         );
     }
-    if let Some(walls) = &body.side_walls {
+    if let (Some(walls), None) = (&body.side_walls, body.channel()) {
         lines.say(
             "side walls",
             &format!(
@@ -56,12 +46,33 @@ pub(super) fn collapse(body: &CollapseScene, ground: Option<&CollapseGround>) ->
             ),
         );
     }
+    let mut cells = format!("{} square cells of {spacing:.4e} m along x", case.cells);
+    if let Some(case) = run::channel::case(body) {
+        let words = run::collapse_ground::words_of;
+        lines.say(
+            "side walls",
+            &format!(
+                "{} m apart, in space: {}; floor: {}",
+                case.width,
+                words(case.walls),
+                words(case.floor)
+            ),
+        );
+        column *= case.cells_across as f64;
+        cells = format!(
+            "{} cells of {spacing:.4e} m along x and z, {} across {}",
+            case.column.cells,
+            case.cells_across,
+            if case.whole {
+                "the channel"
+            } else {
+                "half of the channel"
+            }
+        );
+    }
     lines.say(
         "grid",
-        &format!(
-            "{} square cells of {spacing:.4e} m along x; {column:.0} hold material, and only they cost",
-            case.cells
-        ),
+        &format!("{cells}; {column:.0} hold material, and only they cost"),
     );
     lines.say("left out", &run::collapse::LEFT_OUT.join(", "));
     for remark in body.rheology.remarks() {

@@ -16,9 +16,10 @@ pub(super) fn cylinder(body: &CylinderScene) -> String {
     lines.say(
         "scene",
         &format!(
-            "cylinder-collapse: a cylinder {} m high, {:.4} m in radius, on a rough floor, in space; {} of it is computed",
+            "cylinder-collapse: a cylinder {} m high, {:.4} m in radius, on a floor ({}), in space; {} of it is computed",
             body.height,
             case.radius(),
+            run::collapse_ground::words_of(case.floor),
             if body.grid.whole { "the whole" } else { "a quarter" }
         ),
     );

@@ -4,7 +4,7 @@ mod beside_continuum;
 
 use super::surface_fields::{SurfaceFields, field};
 use super::surface_run::{self, Course, Followed};
-use super::{Findings, Under, collapse_ground, joined_column, world};
+use super::{Findings, Under, channel, collapse_ground, joined_column, world};
 use crate::failure::Failure;
 use crate::scene::{
     CollapseModel, CollapseScene, CollapseSolver, LawVisitor, Scene, ThinLayerKind,
@@ -86,6 +86,9 @@ pub(super) fn check(scene: &Scene, body: &CollapseScene) -> Result<(), Failure> 
     let named =
         |error: colluvium_continuum::Error| Failure::Input(format!("{}: {error}", scene.origin));
     options(body).validate().map_err(named)?;
+    if let Some(case) = channel::case(body) {
+        return case.validate().map_err(named);
+    }
     let check = Check {
         scene: body,
         origin: &scene.origin,
@@ -198,6 +201,9 @@ pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, 
     }
     if scene.model == CollapseModel::Hybrid {
         return joined_column::run(scene, under);
+    }
+    if scene.channel().is_some() {
+        return channel::run(scene, under);
     }
     let origin = under.scene.origin.clone();
     let law = &scene.rheology;

@@ -18,15 +18,32 @@ pub fn ground(scene: &CollapseScene, origin: &str) -> Result<Option<CollapseGrou
     let profile = profile(keys).map_err(refused)?;
     Ok(Some(CollapseGround {
         profile,
-        contact: match keys.contact {
-            ContactKind::NoSlip => Contact::NoSlip,
-            ContactKind::FreeSlip => Contact::FreeSlip,
-            ContactKind::Coulomb => Contact::Coulomb(WallFriction {
-                friction: keys.friction.unwrap_or(0.0),
-                cohesion: 0.0,
-            }),
-        },
+        contact: contact(keys.contact, keys.friction),
     }))
+}
+
+/// What holds on ground, a floor or a wall.
+pub(super) fn contact(kind: ContactKind, friction: Option<f64>) -> Contact {
+    match kind {
+        ContactKind::NoSlip => Contact::NoSlip,
+        ContactKind::FreeSlip => Contact::FreeSlip,
+        ContactKind::Coulomb => Contact::Coulomb(WallFriction {
+            friction: friction.unwrap_or(0.0),
+            cohesion: 0.0,
+        }),
+    }
+}
+
+/// Contact in the words of a plan.
+pub fn words_of(contact: Contact) -> String {
+    match contact {
+        Contact::NoSlip => "material at it stands still".to_owned(),
+        Contact::FreeSlip => "material slides on it freely".to_owned(),
+        Contact::Coulomb(friction) => format!(
+            "material slides on it under friction coefficient {}",
+            friction.friction
+        ),
+    }
 }
 
 fn profile(keys: &TerrainKeys) -> Result<Profile, String> {

@@ -1,6 +1,7 @@
 //! The collapse of a cylinder in space: from the scene to front and deposit.
 
 use super::collapse::options_of;
+use super::collapse_ground::contact;
 use super::surface_fields::space_frame;
 use super::surface_run::{self, Course, Followed};
 use super::{Findings, Under};
@@ -33,6 +34,7 @@ pub fn case(scene: &CylinderScene) -> CylinderCase {
         cells: scene.cells(),
         length_scaled: scene.grid.length_scaled,
         whole: scene.grid.whole,
+        floor: contact(scene.floor.contact, scene.floor.friction),
     }
 }
 

@@ -2,8 +2,8 @@
 
 use super::world::{OutputKeys, StepKeys};
 use super::{
-    ColumnGrainKeys, ColumnOverlapKeys, ColumnZoneKeys, LawKeys, RheologyKeys, SceneError,
-    TerrainKeys,
+    ColumnGrainKeys, ColumnOverlapKeys, ColumnZoneKeys, ContactKind, FrictionLaw, LawKeys,
+    RheologyKeys, SceneError, SurfaceKeys, TerrainKeys,
 };
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -88,6 +88,31 @@ pub struct CollapseWalls {
     /// Friction coefficient of the material on each.
     #[schemars(extend("minimum" = 0.0, "maximum" = 10.0))]
     pub friction: f64,
+    /// The channel in space, with walls where they are; without it their friction is spread over its width.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub in_space: Option<ChannelKeys>,
+}
+
+/// The channel in space.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct ChannelKeys {
+    /// Cells across half of the channel at scale 1, or across all of it if it is whole.
+    #[schemars(extend("minimum" = 1, "maximum" = 256))]
+    pub cells: u64,
+    /// Whether the grid holds the whole width, instead of half of it beside a plane of symmetry.
+    #[serde(default)]
+    pub whole: bool,
+    /// What holds on the walls; their friction counts under "coulomb" only.
+    #[serde(default = "rubbing")]
+    pub contact: ContactKind,
+    /// What holds on the floor.
+    #[serde(default)]
+    pub floor: SurfaceKeys,
+}
+
+fn rubbing() -> ContactKind {
+    ContactKind::Coulomb
 }
 
 /// The grid.
@@ -137,11 +162,23 @@ pub enum ThinLayerKind {
 
 /// Most cells that hold material at the start: their matrix has to fit into memory.
 const LARGEST_COLUMN: f64 = 200_000.0;
+/// The same in space.
+const LARGEST_CHANNEL: f64 = 40_000.0;
 
 impl CollapseScene {
     /// Cells along x at this scale.
     pub fn cells(&self) -> usize {
         (self.grid.cells as f64 * self.scale).round().max(8.0) as usize
+    }
+
+    /// The channel in space, if the scene asks for it.
+    pub fn channel(&self) -> Option<&ChannelKeys> {
+        self.side_walls.as_ref()?.in_space.as_ref()
+    }
+
+    /// Cells across what is computed of a channel, at this scale.
+    pub fn cells_across(&self, keys: &ChannelKeys) -> usize {
+        (keys.cells as f64 * self.scale).round().max(1.0) as usize
     }
 
     pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {
@@ -153,16 +190,40 @@ impl CollapseScene {
             CollapseModel::Continuum => {}
         }
         let per_height = self.cells() as f64 / self.grid.length_scaled;
-        let filled = per_height * per_height / self.aspect;
-        if filled > LARGEST_COLUMN {
+        let channel = self.channel();
+        let across = channel.map_or(1, |keys| self.cells_across(keys));
+        let filled = per_height * per_height / self.aspect * across as f64;
+        let most = match channel {
+            Some(_) => LARGEST_CHANNEL,
+            None => LARGEST_COLUMN,
+        };
+        if filled > most {
             return refused(
                 "grid.cells",
                 self.grid.cells.to_string(),
                 format!(
-                    "at most {LARGEST_COLUMN} cells in the column, here {filled:.0} at scale {}",
+                    "at most {most} cells in the column, here {filled:.0} at scale {}",
                     self.scale
                 ),
             );
+        }
+        if let Some(keys) = channel {
+            keys.floor
+                .check_together(origin, "side_walls.in_space.floor")?;
+            if self.terrain.is_some() || self.overhang_degrees != 0.0 {
+                return refused(
+                    "side_walls.in_space",
+                    "a table".into(),
+                    "left out with [terrain] or an overhang: they are known in a plane".into(),
+                );
+            }
+            if self.rheology.law != FrictionLaw::MuI {
+                return refused(
+                    "rheology.law",
+                    self.rheology.law.word().into(),
+                    "mu-i with side_walls.in_space".into(),
+                );
+            }
         }
         if let Some(terrain) = &self.terrain {
             terrain.check_together(origin)?;

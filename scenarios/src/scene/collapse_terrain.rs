@@ -1,6 +1,6 @@
 //! Keys of the ground under a collapse: `[terrain]`.
 
-use super::SceneError;
+use super::{SceneError, SurfaceKeys};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -102,18 +102,10 @@ impl TerrainKeys {
                 "left out, unless the ground comes from a file",
             );
         }
-        match (self.contact, self.friction) {
-            (ContactKind::Coulomb, None) => Err(SceneError::MissingKey {
-                file: origin.to_owned(),
-                key: "terrain.friction".into(),
-                wanted: "the friction coefficient of contact = \"coulomb\"".into(),
-            }),
-            (ContactKind::NoSlip | ContactKind::FreeSlip, Some(friction)) => refused(
-                "friction",
-                friction.to_string(),
-                "left out, unless terrain.contact is \"coulomb\"",
-            ),
-            _ => Ok(()),
-        }
+        let surface = SurfaceKeys {
+            contact: self.contact,
+            friction: self.friction,
+        };
+        surface.check_together(origin, "terrain")
     }
 }

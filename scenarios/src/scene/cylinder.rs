@@ -1,11 +1,11 @@
 //! Keys of the collapse of a cylinder.
 
 use super::collapse::{check_rheology, out_of_range};
-use super::{CollapseSolver, FrictionLaw, RheologyKeys, SceneError};
+use super::{CollapseSolver, FrictionLaw, RheologyKeys, SceneError, SurfaceKeys};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
-/// A cylinder that collapses on a rough floor, in space.
+/// A cylinder that collapses on a floor, in space.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct CylinderScene {
@@ -29,6 +29,9 @@ pub struct CylinderScene {
     pub scale: f64,
     /// The material.
     pub rheology: RheologyKeys,
+    /// What holds on the floor.
+    #[serde(default)]
+    pub floor: SurfaceKeys,
     /// The grid.
     pub grid: CylinderGrid,
     /// The solver.
@@ -83,6 +86,7 @@ impl CylinderScene {
                 ),
             ));
         }
+        self.floor.check_together(origin, "floor")?;
         let law = self.rheology.law;
         if law != FrictionLaw::MuI {
             return Err(out_of_range(

@@ -7,6 +7,7 @@ use crate::free_surface::faces::{Face, Faces};
 use crate::free_surface::fraction::reconstruct;
 use crate::free_surface::ground::DUST;
 use crate::free_surface::operators::{Material, Operators};
+use crate::free_surface::sliding::some_wall_adheres;
 use crate::free_surface::transport::MASSLESS;
 use crate::rheology::Rheology;
 use crate::yield_step::{PrimalDual, Residuals, StepProblem, YieldSolver};
@@ -56,6 +57,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             inflow: self.inflow.as_ref(),
             acceleration,
             outside: self.outside.as_ref(),
+            sliding: &self.sliding,
         };
         let Operators {
             discretisation,
@@ -127,6 +129,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             && unknowns.p.iter().all(|p| *p <= f64::MIN_POSITIVE)
             && unknowns.s.iter().all(|s| *s == [0.0; C])
             && self.rheology.threshold(1.0, 0.0).stress == 0.0
+            && !some_wall_adheres(&self.grid)
             && self
                 .side_walls
                 .is_none_or(|walls| walls.friction.cohesion == 0.0);

@@ -8,10 +8,11 @@ use crate::free_surface::ground::contact::sliding_place;
 use crate::free_surface::ground::faces::faces_over;
 use crate::free_surface::ground::{Contact, Ground, Terrain};
 use crate::free_surface::open_ends::{Inflow, can_open};
-use crate::free_surface::operators::{POINTS, points_of};
+use crate::free_surface::operators::POINTS;
+use crate::free_surface::sliding::SlidingPlaces;
 use crate::free_surface::topology::{NONE, Topology};
 use crate::free_surface::transport::Transport;
-use crate::grid::{DIMENSIONS, Grid};
+use crate::grid::{Boundary, DIMENSIONS, Grid};
 use crate::rheology::Rheology;
 use crate::wall_friction::SideWalls;
 use crate::yield_step::FlowState;
@@ -138,11 +139,19 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         options: SurfaceOptions,
     ) -> Result<Self, Error> {
         options.validate()?;
+        for axis in grid.axes() {
+            for face in [0, axis.cells()] {
+                if let Some(Boundary::CoulombWall { friction, .. }) = axis.boundary_at(face) {
+                    friction.validate()?;
+                }
+            }
+        }
         let topology = Topology::new(&grid);
+        let sliding = SlidingPlaces::new(&grid);
         let state = SurfaceState {
             velocity: std::array::from_fn(|c| vec![0.0; topology.faces(c)]),
             pressure: vec![INACTIVE; topology.cells()],
-            stress: vec![[0.0; C]; topology.cells() * points_of(D)],
+            stress: vec![[0.0; C]; sliding.end],
             fractions,
             ..SurfaceState::default()
         };
@@ -152,6 +161,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             planes: Vec::new(),
             transport: Transport::default(),
             side_walls: None,
+            sliding,
             bed: None,
             inflow: None,
             outside: None,

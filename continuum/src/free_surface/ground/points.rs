@@ -9,6 +9,11 @@ use crate::free_surface::operators::{EMPTY, Material, POINTS};
 use crate::free_surface::topology::NONE;
 use crate::grid::DIMENSIONS;
 
+/// Ground whose normal has less than this of another axis lies along one.
+const ALONG_AXIS: f64 = 1e-9;
+/// Part of the stretching of a cell in the middle of a quarter of it on ground along an axis.
+const STRETCHING_ON_GROUND: f64 = 0.5;
+
 impl Material<'_> {
     /// Material in a quarter of a cell, in cells.
     fn quarter(&self, ground: &Ground, cell: usize, corner: usize) -> f64 {
@@ -34,7 +39,8 @@ impl Material<'_> {
         for corner in 0..POINTS {
             let side = [corner % 2, corner / 2];
             let around = self.cells_around(cell, side);
-            let volume = match self.share_on_ground(ground, side, around) {
+            let on_ground = self.share_on_ground(ground, side, around);
+            let volume = match on_ground {
                 Some(share) => share * ground.quarters[cell][corner],
                 None => self.quarter(ground, cell, corner),
             };
@@ -50,6 +56,9 @@ impl Material<'_> {
             let mut point = QuadraturePoint::new(volume * self.grid.cell_volume());
             for (axis, orientation) in [(0, 1.0), (1, -1.0)] {
                 self.add_stretching_over(ground, cell, axis, orientation, &mut point);
+            }
+            if on_ground.is_some() && Self::sticks_along_axis(ground, cell, side, around) {
+                point.scale_rate(0, STRETCHING_ON_GROUND);
             }
             self.add_shear_over(ground, cell, side, around, &mut point);
             let mut pressure = Interpolation::default();
@@ -116,6 +125,33 @@ impl Material<'_> {
             }
         }
         Some(all / bearing)
+    }
+
+    /// Whether matter at a corner sticks to ground that lies along an axis, as it does to a wall of the grid: then its
+    /// stretching grows in proportion to the distance from it.
+    fn sticks_along_axis(
+        ground: &Ground,
+        cell: usize,
+        side: [usize; DIMENSIONS],
+        around: [usize; 4],
+    ) -> bool {
+        if ground.contact.slides() {
+            return false;
+        }
+        let [x, z] = match ground.wall[cell] {
+            [0.0, 0.0] => {
+                // It lies on faces of the grid: the quarters tell on which side. A wall beside the grid is no ground.
+                let [own, mut beside, above, mut across] =
+                    Self::quarters_around(ground, side, around);
+                if around[1] == NONE {
+                    (beside, across) = (own, above);
+                }
+                [own + above - beside - across, own + beside - above - across]
+            }
+            normal => normal,
+        };
+        let [least, most] = [x.abs().min(z.abs()), x.abs().max(z.abs())];
+        most > 0.0 && least <= ALONG_AXIS * most
     }
 
     /// Free part of the cell around a corner.
