@@ -210,7 +210,7 @@ fn deposits_converge_with_the_grid() {
 /// 0.279; d = 1.15 mm = L/87) against the bands of the experiments of Lube et al. and Lajeunesse et al., as
 /// Lagrée, Staron & Popinet (2011, eq. 3.1) state their laws. The experiments were made in channels: one 45 mm wide whose
 /// walls rub with tan 10.4° (glass beads on glass) is assumed for all of them. Negative control:
-/// with μ_s = 2 every band refuses the run.
+/// with μ_s = 0.9 every band refuses the run.
 #[test]
 #[ignore = "long: run by tests/validate.sh"]
 fn runout_beside_the_bands_of_experiments() {
@@ -258,9 +258,9 @@ fn runout_beside_the_bands_of_experiments() {
     .map(|(grid, band)| {
         let plane = runout(0.381863, 0.643468, grid, None);
         let channel = runout(0.381863, 0.643468, grid, Some(walls));
-        let stiff = runout(2.0, 2.3, grid, None);
+        let stiff = runout(0.9, 1.2, grid, None);
         println!(
-            "glass beads, a = {}: run-out {plane:.2}, in the channel {channel:.2}, experiments {band:?}; with μ_s = 2 {stiff:.2}",
+            "glass beads, a = {}: run-out {plane:.2}, in the channel {channel:.2}, experiments {band:?}; with μ_s = 0.9 {stiff:.2}",
             grid.0
         );
         assert!(!band.contains(&stiff));
