@@ -14,6 +14,7 @@ mod check;
 mod chute;
 mod cliff;
 mod cliff_runout;
+mod cliff_terrain;
 mod collapse;
 mod collapse_grains;
 mod collapse_terrain;
@@ -25,6 +26,7 @@ mod error;
 mod friction_keys;
 mod friction_law;
 mod grains;
+mod ground_source;
 mod impact;
 mod incline;
 mod kinds;
@@ -48,6 +50,7 @@ pub use boulder::BoulderScene;
 pub use chute::ChuteScene;
 pub use cliff::{CliffCrackKeys, CliffModel, CliffScene, CliffShapeKeys};
 pub use cliff_runout::CliffRunoutKeys;
+pub use cliff_terrain::CliffTerrainKeys;
 pub use collapse::{
     ChannelKeys, CollapseGrid, CollapseModel, CollapseScene, CollapseSolver, CollapseWalls,
     ThinLayerKind,
@@ -61,6 +64,7 @@ pub use cylinder::{CylinderGrid, CylinderScene};
 pub use error::SceneError;
 pub use friction_law::LawVisitor;
 pub use grains::GrainsScene;
+pub use ground_source::GroundSource;
 pub use impact::{ImpactScene, RollingKeys};
 pub use incline::{
     Bracket, CalibrationKeys, ContactKeys, FloorKeys, GrainKeys, GuessKeys, InclineScene,
@@ -354,7 +358,7 @@ impl Scene {
             _ => {}
         }
         if let SceneBody::Collapse(body) = &body {
-            let terrain = body.terrain.as_ref().and_then(TerrainKeys::file);
+            let terrain = body.terrain.as_ref().and_then(|keys| keys.source().file());
             inputs.extend(terrain.map(|(_, file)| PathBuf::from(file)));
         }
         let scene = Scene {

@@ -8,6 +8,7 @@
 mod debris;
 mod findings;
 pub mod joined;
+mod land;
 mod record;
 mod runout;
 mod section;
@@ -129,6 +130,8 @@ impl Recipe for CliffScene {
             "output",
             "runout",
             "sinter",
+            "terrain",
+            "shape.room_scaled",
             "shape.sintered",
             "crack.depth_scaled",
             "crack.thickness_diameters",
@@ -207,10 +210,16 @@ impl Recipe for CliffScene {
             section: "sinter",
         };
         let ground = materials.number("ground", "ground", at)?;
-        let fall = (2.0 * self.gravity * self.shape.height).sqrt();
+        let land = self.land(origin)?;
+        let across = packing.domain.lengths().y;
+        let walls = match &land {
+            None => self.ground(ground, across),
+            Some(land) => vec![self.ground_on(land, ground, across)?],
+        };
+        let fall = (2.0 * self.gravity * (self.shape.height - land::lowest(land.as_ref()))).sqrt();
         let mut world = World {
             gravity: -self.gravity * Vector3::z(),
-            walls: self.ground(ground, packing.domain.lengths().y),
+            walls,
             speed: 2.0 * fall,
             ..World::empty(self.standing + self.duration)
         };
@@ -249,7 +258,19 @@ impl Recipe for CliffScene {
     fn plan(&self) -> Vec<(String, String)> {
         let [whole, before] = self.areas();
         let fall = (2.0 * self.face() / self.gravity).sqrt();
+        let before_it = match self.terrain.as_ref().map(|keys| keys.source().file()) {
+            None => "a plane".to_owned(),
+            Some(None) => "the line of terrain.profile".to_owned(),
+            Some(Some((_, file))) => format!("a section of {file}"),
+        };
         vec![
+            (
+                "ground".into(),
+                format!(
+                    "before the cliff {before_it}; debris is looked for up to x = {:.0} m",
+                    self.far_end()
+                ),
+            ),
             (
                 "cliff".into(),
                 format!(
@@ -352,8 +373,9 @@ impl Recipe for CliffScene {
         let grains = ran.simulation.grain_list();
         let base = record.heap.solid_fraction * across;
         let deposit = self.heights(&grains, &axis, base);
+        let land = self.land("")?;
         self.put_times(&record, ran, summary);
-        self.put_pile(&places, &deposit, d, summary);
+        self.put_pile([&places, &deposit], d, land.as_ref(), summary);
         let beyond = volume_beyond(&ran.seen.grains, 0.0) / record.heap.solid_fraction;
         let share = beyond / (across * self.areas()[1]);
         let now: BTreeSet<[u32; 2]> = fragments::touching(&mut ran.simulation)
@@ -376,7 +398,7 @@ impl Recipe for CliffScene {
             &[("sunk", "sunk on the mean"), ("x_front", "front")],
             "How far what stood before the crack has sunk, and where the debris ends.",
         ));
-        let mut tables = record.heap.tables(places, deposit);
+        let mut tables = CliffScene::tables(&record, places, deposit, land.as_ref());
         tables.push(sizes);
         Ok(tables)
     }

@@ -1,7 +1,7 @@
 //! The ground under a collapse, from the scene's points or its file.
 
 use crate::failure::Failure;
-use crate::scene::{CollapseScene, ContactKind, TerrainKeys};
+use crate::scene::{CollapseScene, ContactKind, GroundSource};
 use crate::{height_files, mesh_files};
 use colluvium_continuum::column_collapse::CollapseGround;
 use colluvium_continuum::free_surface::Contact;
@@ -15,7 +15,7 @@ pub fn ground(scene: &CollapseScene, origin: &str) -> Result<Option<CollapseGrou
         return Ok(None);
     };
     let refused = |error: String| Failure::Input(format!("{origin}: {error}"));
-    let profile = profile(keys).map_err(refused)?;
+    let profile = profile(keys.source()).map_err(refused)?;
     Ok(Some(CollapseGround {
         profile,
         contact: contact(keys.contact, keys.friction),
@@ -46,13 +46,14 @@ pub fn words_of(contact: Contact) -> String {
     }
 }
 
-fn profile(keys: &TerrainKeys) -> Result<Profile, String> {
+/// The line of the ground, x = 0 where a scene says that it starts.
+pub(super) fn profile(source: GroundSource) -> Result<Profile, String> {
     let said = |error: colluvium_continuum::Error| error.to_string();
-    if let Some(points) = &keys.profile {
-        return Profile::new(points.clone()).map_err(said);
+    if let Some(points) = source.profile {
+        return Profile::new(points.to_vec()).map_err(said);
     }
-    let [x, y] = keys.start.unwrap_or_default();
-    let Some((key, file)) = keys.file() else {
+    let [x, y] = source.start.unwrap_or_default();
+    let Some((key, file)) = source.file() else {
         return Err("key `terrain.profile` is missing".into());
     };
     let path = Path::new(file);
@@ -69,7 +70,7 @@ fn profile(keys: &TerrainKeys) -> Result<Profile, String> {
         raster.profile(y)
     } else {
         let surface = mesh_files::read_surface(path).map_err(|error| in_file(error.to_string()))?;
-        let unit = keys.unit.unwrap_or(1.0);
+        let unit = source.unit.unwrap_or(1.0);
         let vertices = surface
             .vertices
             .iter()

@@ -2,6 +2,7 @@
 
 use super::boulder::GroundKeys;
 use super::cliff_runout::CliffRunoutKeys;
+use super::cliff_terrain::CliffTerrainKeys;
 use super::comet::{CometBlockKeys, CometKeys};
 use super::world::{BondKeys, Materials, OutputKeys, Place, StepKeys, SurfaceKeys};
 use super::{CohesionKind, LawKeys, SceneError};
@@ -54,6 +55,9 @@ pub struct CliffScene {
     pub preparation: CometBlockKeys,
     /// What the ground is like, and a wall below.
     pub ground: GroundKeys,
+    /// What lies before it, where that is not a plane.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub terrain: Option<CliffTerrainKeys>,
     /// The law of all contacts.
     pub contact: LawKeys,
     /// Bonds of ice to ice in the top layer, where the material is sintered.
@@ -91,6 +95,9 @@ pub struct CliffShapeKeys {
     /// Thickness of the sintered top layer (m).
     #[schemars(extend("minimum" = 0.0, "maximum" = 1.0e5))]
     pub sintered: f64,
+    /// Length beyond the lip over which debris is looked for and on which its continuum runs out, over the height.
+    #[schemars(extend("minimum" = 1.0, "maximum" = 1000.0))]
+    pub room_scaled: f64,
 }
 
 /// The crack: a tilted slab without bonds and without cohesion, from the top down towards the foot of the face.
@@ -145,6 +152,9 @@ impl CliffScene {
     pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {
         let at = |section| Place { origin, section };
         self.check_runout(origin)?;
+        if let Some(terrain) = &self.terrain {
+            terrain.source().check_together(origin)?;
+        }
         self.material.check_together(origin)?;
         self.preparation
             .softness()

@@ -1,6 +1,6 @@
 //! Keys of the ground under a collapse: `[terrain]`.
 
-use super::{SceneError, SurfaceKeys};
+use super::{GroundSource, SceneError, SurfaceKeys};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -49,59 +49,19 @@ pub enum ContactKind {
 }
 
 impl TerrainKeys {
-    /// The file that the ground is read from, and its key.
-    pub fn file(&self) -> Option<(&'static str, &str)> {
-        let heights = self.heights.as_deref().map(|f| ("heights", f));
-        heights.or(self.mesh.as_deref().map(|f| ("mesh", f)))
+    /// Where the ground comes from.
+    pub fn source(&self) -> GroundSource<'_> {
+        GroundSource {
+            profile: self.profile.as_deref(),
+            heights: self.heights.as_deref(),
+            mesh: self.mesh.as_deref(),
+            unit: self.unit,
+            start: self.start,
+        }
     }
 
     pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {
-        let refused = |key: &str, value: String, range: &str| {
-            Err(SceneError::OutOfRange {
-                file: origin.to_owned(),
-                key: format!("terrain.{key}"),
-                value,
-                range: range.to_owned(),
-            })
-        };
-        let given = [
-            ("profile", self.profile.is_some()),
-            ("heights", self.heights.is_some()),
-            ("mesh", self.mesh.is_some()),
-        ];
-        let names: Vec<&str> = given.iter().filter(|g| g.1).map(|g| g.0).collect();
-        if names.is_empty() {
-            return Err(SceneError::MissingKey {
-                file: origin.to_owned(),
-                key: "terrain.profile".into(),
-                wanted: "points [[x, z], ...] in m, or terrain.heights or terrain.mesh, a file"
-                    .into(),
-            });
-        }
-        if names.len() > 1 {
-            return refused(
-                names[1],
-                "given".into(),
-                &format!(
-                    "only one of profile, heights and mesh; terrain.{} is there",
-                    names[0]
-                ),
-            );
-        }
-        if let (Some(unit), None) = (self.unit, &self.mesh) {
-            return refused(
-                "unit",
-                unit.to_string(),
-                "left out, unless there is a terrain.mesh",
-            );
-        }
-        if let (Some(start), Some(_)) = (self.start, &self.profile) {
-            return refused(
-                "start",
-                format!("{start:?}"),
-                "left out, unless the ground comes from a file",
-            );
-        }
+        self.source().check_together(origin)?;
         let surface = SurfaceKeys {
             contact: self.contact,
             friction: self.friction,

@@ -101,13 +101,15 @@ impl Kind {
 }
 
 /// Dotted paths of files in scenes of grains; `*` stands for any name, or for each of a list.
-const FILES: [&str; 6] = [
+const FILES: [&str; 8] = [
     "bed",
     "walls.*.file",
     "walls.*.motion.file",
     "bodies.*.parts.*.file",
     "bodies.*.motion.file",
     "gravity.file",
+    "terrain.heights",
+    "terrain.mesh",
 ];
 
 /// Makes relative paths of a scene file relative to that file's folder.

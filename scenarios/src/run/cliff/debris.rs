@@ -16,11 +16,19 @@ pub struct Pile {
     pub area: f64,
     /// Its length from the foot of the cliff (m).
     pub length: f64,
+    /// How much higher the ground is where it is highest than where it ends (m).
+    pub descent: f64,
 }
 
 impl Pile {
-    /// Of heights (m) over places (m), beyond the foot of the cliff; none where nothing lies there.
-    pub fn of(places: &[f64], heights: &[f64], foot: f64, threshold: f64) -> Option<Pile> {
+    /// Of heights (m) over the ground at places (m), beyond the foot of the cliff; none where nothing lies there. `ground` is
+    /// its own height (m).
+    pub fn of(
+        [places, heights]: [&[f64]; 2],
+        foot: f64,
+        threshold: f64,
+        ground: impl Fn(f64) -> f64,
+    ) -> Option<Pile> {
         let first = places.partition_point(|x| *x < foot);
         let last = (first..heights.len())
             .rev()
@@ -36,12 +44,14 @@ impl Pile {
             end,
             area,
             length: end - foot,
+            descent: ground(places[top]) - ground(end),
         })
     }
 
-    /// Mean angle of repose (degrees): height over run-out, both from its top (Kappel et al. 2020, §4.2).
+    /// Mean angle of repose (degrees): fall of its surface over run-out, both from its top (Kappel et al. 2020, §4.2).
     pub fn repose_degrees(&self) -> f64 {
-        (self.height / (self.end - self.top)).atan().to_degrees()
+        let fall = self.height + self.descent;
+        (fall / (self.end - self.top)).atan().to_degrees()
     }
 
     /// Slope of the wedge of its area and its length: `tan = 2 A/L²` (degrees). Other than the angle from the
@@ -93,7 +103,8 @@ mod tests {
             x => (10.0 - 0.4 * (x - 5.5)).max(0.0),
         };
         let heights: Vec<f64> = places.iter().map(|&x| height(x)).collect();
-        let pile = Pile::of(&places, &heights, 0.0, 0.2).unwrap();
+        let level = |_: f64| 0.0;
+        let pile = Pile::of([&places, &heights], 0.0, 0.2, level).unwrap();
         assert_eq!((pile.top, pile.height), (5.5, 10.0));
         assert!((pile.end - 30.0).abs() < 1e-9, "{}", pile.end);
         assert!((pile.repose_degrees() - (10.0f64 / 24.5).atan().to_degrees()).abs() < 1e-9);
@@ -109,7 +120,11 @@ mod tests {
             "{}",
             pile.wedge_degrees()
         );
-        assert_eq!(Pile::of(&places, &[0.0; 60], 0.0, 0.2), None);
+        assert_eq!(Pile::of([&places, &[0.0; 60]], 0.0, 0.2, level), None);
+        // On ground that falls by 0.1 a metre its surface falls by so much more.
+        let pile = Pile::of([&places, &heights], 0.0, 0.2, |x| -0.1 * x).unwrap();
+        let slope = pile.repose_degrees().to_radians().tan();
+        assert!((slope - (10.0 / 24.5 + 0.1)).abs() < 1e-9, "{slope}");
     }
 
     #[test]

@@ -9,6 +9,7 @@ use crate::run::world::boulders::size_index;
 use crate::scene::CliffScene;
 use crate::summary::{Quantity, Summary};
 use crate::table::Table;
+use colluvium_continuum::terrain::Profile;
 
 /// What §4.2 of the paper says of the Aswan cliff: the pile's height (m), its distance from the wall (m), the
 /// run-out from there (m), the mean angle of repose (degrees), the share of bonds that survives, the size of the
@@ -89,8 +90,17 @@ impl CliffScene {
         }
     }
 
-    pub(super) fn put_pile(&self, places: &[f64], deposit: &[f64], d: f64, summary: &mut Summary) {
-        let pile = Pile::of(places, deposit, 0.0, EDGE * d);
+    /// What the debris is like: heights (m) over the ground at places (m), of parcels of a mean diameter (m), on a plane or on
+    /// land.
+    pub(super) fn put_pile(
+        &self,
+        heap: [&[f64]; 2],
+        d: f64,
+        land: Option<&Profile>,
+        summary: &mut Summary,
+    ) {
+        let ground = |x: f64| CliffScene::ground_height(land, x);
+        let pile = Pile::of(heap, 0.0, EDGE * d, ground);
         let of = |f: &dyn Fn(&Pile) -> f64| pile.as_ref().map_or(f64::NAN, f);
         let m = |value: f64| Quantity::new(value, "m");
         let degrees = |value: f64| Quantity::new(value, "degrees");
@@ -106,12 +116,18 @@ impl CliffScene {
         let source = "of the debris from the pile's top";
         summary.put("runout", self.reference(2, runout, source));
         let repose = degrees(of(&Pile::repose_degrees));
-        let source =
-            "atan(pile's height over run-out from its top); 20 to 30 on 67P (Vincent et al. 2016)";
+        let source = "atan(fall of the pile's surface over run-out, from its top); 20 to 30 on 67P (Vincent et al. 2016)";
         summary.put("repose", self.reference(3, repose, source));
-        let wedge = degrees(of(&Pile::wedge_degrees));
-        let source = "of the wedge from the foot with the debris' area and length: atan(2 A/L²)";
-        summary.put("debris_slope", wedge.from(source));
+        // A wedge says something on a plane alone.
+        let wedge = of(&|p| land.map_or_else(|| p.wedge_degrees(), |_| f64::NAN));
+        let source = "of the wedge from the foot with the debris' area and length: atan(2 A/L²); null on terrain";
+        summary.put("debris_slope", degrees(wedge).from(source));
+        let reach = |p: &Pile| {
+            let fall = self.shape.height - ground(p.end);
+            (fall / (p.end + self.crack_head())).atan().to_degrees()
+        };
+        let source = "from the head of the crack down to where the debris ends (Fahrböschung)";
+        summary.put("reach_angle", degrees(of(&reach)).from(source));
     }
 
     /// How broken it is: the share of the debris (of what stood before the crack), of contacts that hold, and how far it has

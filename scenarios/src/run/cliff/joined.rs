@@ -76,7 +76,7 @@ impl<'a> JoinedCliff<'a> {
         }
         let damaged = || Failure::Input("--resume: the checkpoint is damaged: recipe/state".into());
         let (broken, rest) = Broken::read(rest).ok_or_else(damaged)?;
-        let runout = Runout::read(self.scene, rest).ok_or_else(damaged)?;
+        let runout = Runout::read(self.scene, &self.origin, rest).ok_or_else(damaged)?;
         *guard = Some(Live { broken, runout });
         Ok(())
     }
@@ -137,7 +137,7 @@ impl<'a> JoinedCliff<'a> {
             record.heap.solid_fraction,
         );
         let across = simulation.domain().lengths().y;
-        let runout = Runout::begin(scene, law, across, &debris, simulation.time())?;
+        let runout = Runout::begin(scene, &self.origin, law, across, &debris, simulation.time())?;
         simulation.remove(|g| marked.contains(&g.id));
         simulation.fix(|_| true);
         Ok(Live { broken, runout })
@@ -179,7 +179,7 @@ impl Recipe for JoinedCliff<'_> {
             .scene
             .runout
             .law(comet::diameter(&materials), density, solid);
-        Runout::check(self.scene, law)
+        Runout::check(self.scene, &self.origin, law)
             .map_err(|why| Failure::Input(format!("{}: section runout: {why}", self.origin)))
     }
 

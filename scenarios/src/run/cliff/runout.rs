@@ -1,6 +1,6 @@
 //! The debris of a cliff as a continuum: from the grains it was to its rest.
 //!
-//! The ground is what is left of the cliff, cut along its crack, the wall below it and the plane it stands on.
+//! The ground is what is left of the cliff, cut along its crack, the wall below it and what lies before it: a plane or land.
 
 use crate::failure::Failure;
 use crate::run::bagnold::failure;
@@ -40,12 +40,13 @@ const HEAD: usize = 20;
 
 impl Runout {
     /// Ground and grid, with nothing on it yet, in a slab of a width (m).
-    fn bare(scene: &CliffScene, law: MuI, width: f64) -> Result<Self, Failure> {
+    fn bare(scene: &CliffScene, origin: &str, law: MuI, width: f64) -> Result<Self, Failure> {
         let d = law.diameter;
         let axis = scene.heap_axis(d);
         let (low, height) = (axis.start, scene.shape.height);
         let length = axis.spacing * axis.columns as f64;
-        let own = scene.left_standing(low + length)?;
+        let land = scene.land(origin)?;
+        let own = scene.left_standing(low + length, land.as_ref())?;
         let shifted = own.points().iter().map(|[x, z]| [x - low, *z]);
         let ground = CollapseGround {
             profile: Profile::new(shifted.collect()).map_err(failure)?,
@@ -74,19 +75,20 @@ impl Runout {
     }
 
     /// Whether ground, grid and law fit together.
-    pub fn check(scene: &CliffScene, law: MuI) -> Result<(), Failure> {
-        Self::bare(scene, law, 1.0).map(drop)
+    pub fn check(scene: &CliffScene, origin: &str, law: MuI) -> Result<(), Failure> {
+        Self::bare(scene, origin, law, 1.0).map(drop)
     }
 
     /// Of grains, in a slab of a width (m), at a time (s).
     pub fn begin(
         scene: &CliffScene,
+        origin: &str,
         law: MuI,
         width: f64,
         grains: &[Grain],
         time: f64,
     ) -> Result<Self, Failure> {
-        let mut runout = Self::bare(scene, law, width)?;
+        let mut runout = Self::bare(scene, origin, law, width)?;
         let debris = Debris {
             grains,
             solid_fraction: law.solid_fraction,
@@ -219,7 +221,7 @@ impl Runout {
     }
 
     /// Reads it back; none if the numbers are not those of such a scene.
-    pub fn read(scene: &CliffScene, memory: &[f64]) -> Option<Self> {
+    pub fn read(scene: &CliffScene, origin: &str, memory: &[f64]) -> Option<Self> {
         let (head, mut rest) = memory.split_first_chunk::<HEAD>()?;
         let mut take = || {
             let (length, after) = rest.split_first()?;
@@ -234,7 +236,7 @@ impl Runout {
         };
         let [diameter, grain_density, solid, width, begun, ..] = *head;
         let law = scene.runout.law(diameter, grain_density, solid);
-        let mut runout = Self::bare(scene, law, width).ok()?;
+        let mut runout = Self::bare(scene, origin, law, width).ok()?;
         runout.handed = Handed {
             volume: [head[9], head[10]],
             momentum: [[head[11], head[12]], [head[13], head[14]]],
@@ -283,18 +285,32 @@ pub fn nothing_yet(time: f64) -> Frame {
 
 impl CliffScene {
     /// The ground of the run-out, from the back of the cliff to an end (m): what stands behind the crack, the wall below
-    /// it, and the plane.
-    fn left_standing(&self, end: f64) -> Result<Profile, Failure> {
+    /// it, and the plane or the land before it.
+    fn left_standing(&self, end: f64, land: Option<&Profile>) -> Result<Profile, Failure> {
         let least = UPRIGHT * self.shape.height;
         let mut points = vec![
             [self.back() - least, self.shape.height],
             [-self.crack_head().max(least), self.shape.height],
             [0.0, self.shape.wall],
         ];
-        if self.shape.wall > 0.0 {
-            points.push([least, 0.0]);
+        match land {
+            None => {
+                if self.shape.wall > 0.0 {
+                    points.push([least, 0.0]);
+                }
+                points.push([end + least, 0.0]);
+            }
+            Some(land) => {
+                if self.shape.wall > 0.0 {
+                    points.push([least, Self::ground_height(Some(land), least)]);
+                }
+                let mut last = least;
+                for [x, z] in land.points().iter().filter(|p| p[0] > least) {
+                    last = x.max(last + least);
+                    points.push([last, *z]);
+                }
+            }
         }
-        points.push([end + least, 0.0]);
         Profile::new(points).map_err(failure)
     }
 }

@@ -14,12 +14,10 @@ use std::collections::BTreeSet;
 const PROFILE_EVERY: usize = 20;
 /// Height over the mean diameter of parcels at which debris ends: half a layer of single parcels.
 pub(super) const EDGE: f64 = 0.25;
-/// Heights of the cliff beyond its lip in which debris is looked for.
-const ROOM: f64 = 4.0;
 
 impl CliffScene {
     pub(super) fn heap_axis(&self, diameter: f64) -> HeapAxis {
-        let length = self.lip() - self.back() + ROOM * self.shape.height;
+        let length = self.far_end() - self.back();
         HeapAxis {
             start: self.back(),
             spacing: diameter,

@@ -2,6 +2,7 @@
 //! projection.
 
 pub(crate) mod canvas;
+mod grounds;
 
 use super::recipe::Recipe;
 use crate::body_facets;
@@ -10,7 +11,8 @@ use crate::run_directory::RunDirectory;
 use crate::scene::world::Materials;
 use crate::summary::Figure;
 use canvas::{Ball, Plate};
-use colluvium_dem::{Body, Shape, Simulation, Snapshot};
+use colluvium_dem::{Body, Simulation, Snapshot};
+use grounds::Ground;
 use nalgebra::Vector3;
 
 /// Colours of kinds and clusters, apart for the colour-blind (after Okabe & Ito).
@@ -182,7 +184,7 @@ impl<'a> Pictures<'a> {
                 colour: colour(k, grain),
             })
             .collect();
-        let grounds = self.grounds(simulation, [right, up]);
+        let grounds = self.grounds(simulation, &balls, [right, up]);
         let plates = self.plates(simulation, [right, up, away]);
         let (pixels, size) = canvas::paint(&balls, &plates, &grounds);
         let text = match colouring {
@@ -221,19 +223,25 @@ impl<'a> Pictures<'a> {
             .collect()
     }
 
-    /// Planes that are seen from their sides: a point and the normal, in the picture (m).
-    fn grounds(&self, simulation: &Simulation, axes: [Vector3<f64>; 2]) -> Vec<[[f64; 2]; 2]> {
-        let walls = 0..simulation.wall_count();
-        let seen = walls.filter_map(|k| {
-            let (shape, pose) = (&simulation.wall(k).shape, simulation.wall_pose(k));
-            let Shape::Plane(plane) = shape else {
-                return None;
-            };
-            let normal = pose.outward(&plane.normal);
-            let flat = |v: &Vector3<f64>| [v.dot(&axes[0]), v.dot(&axes[1])];
-            (normal.dot(&self.view[0]).abs() < 1e-9).then(|| [flat(&pose.position), flat(&normal)])
-        });
-        seen.collect()
+    /// Walls that are seen from their side, where grains are.
+    fn grounds(
+        &self,
+        simulation: &Simulation,
+        balls: &[Ball],
+        [right, up]: [Vector3<f64>; 2],
+    ) -> Vec<Ground> {
+        let ends = balls
+            .iter()
+            .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], ball| {
+                [low.min(ball.at[0]), high.max(ball.at[0])]
+            });
+        let axes = [right, up, self.view[0]];
+        (0..simulation.wall_count())
+            .filter_map(|k| {
+                let pose = simulation.wall_pose(k);
+                Ground::of(&simulation.wall(k).shape, &pose, axes, ends)
+            })
+            .collect()
     }
 
     /// All pictures that were taken, as figures of the report.

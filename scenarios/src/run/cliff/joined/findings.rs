@@ -5,6 +5,7 @@ use crate::failure::Failure;
 use crate::run::cliff::record::CliffRecord;
 use crate::run::world::Ran;
 use crate::run::world::boulders::boulders;
+use crate::scene::CliffScene;
 use crate::state_hash;
 use crate::summary::{Figure, Quantity, Summary};
 use crate::table::Table;
@@ -25,8 +26,10 @@ impl JoinedCliff<'_> {
         let deposit = self.heights(&mut ran.simulation, live, record.heap.solid_fraction);
         let places = axis.positions();
         self.scene.put_times(&record, ran, summary);
+        let land = self.scene.land(&self.origin)?;
+        let heap = [places.as_slice(), &deposit];
         self.scene
-            .put_pile(&places, &deposit, runout.diameter(), summary);
+            .put_pile(heap, runout.diameter(), land.as_ref(), summary);
         let across = ran.simulation.domain().lengths().y;
         let beyond = runout.parcels().into_iter().filter(|[x, _]| *x > 0.0);
         let beyond: f64 = beyond.map(|[_, volume]| volume).sum();
@@ -61,7 +64,7 @@ impl JoinedCliff<'_> {
             &[("sunk", "sunk on the mean"), ("x_front", "front")],
             "How far what stood before the crack has sunk while it was grains, and where the debris ends.",
         ));
-        let mut tables = record.heap.tables(places, deposit);
+        let mut tables = CliffScene::tables(&record, places, deposit, land.as_ref());
         tables.push(sizes);
         Ok(tables)
     }

@@ -1,5 +1,7 @@
 //! What pictures are painted on: the nearest of balls, triangles and grounds at each pixel.
 
+use super::grounds::Ground;
+
 /// Pixels along the longer edge.
 const SIZE: f64 = 720.0;
 /// Margin around the grains, over the longer edge.
@@ -99,17 +101,16 @@ impl Canvas {
     }
 
     /// What lies behind everything.
-    fn lay(&mut self, grounds: &[[[f64; 2]; 2]]) {
+    fn lay(&mut self, grounds: &[Ground]) {
         for row in 0..self.size[1] {
             for column in 0..self.size[0] {
                 let x = self.place(column, row);
-                let below =
-                    |[p, n]: &[[f64; 2]; 2]| (x[0] - p[0]) * n[0] + (x[1] - p[1]) * n[1] < 0.0;
-                self.pixels.extend(if grounds.iter().any(below) {
-                    GROUND
-                } else {
-                    PAPER
-                });
+                self.pixels
+                    .extend(if grounds.iter().any(|ground| ground.holds(x)) {
+                        GROUND
+                    } else {
+                        PAPER
+                    });
             }
         }
     }
@@ -187,7 +188,7 @@ impl Canvas {
 }
 
 /// Pixels as rows of RGB from the top, and their numbers along both edges; around everything.
-pub fn paint(balls: &[Ball], plates: &[Plate], grounds: &[[[f64; 2]; 2]]) -> (Vec<u8>, [usize; 2]) {
+pub fn paint(balls: &[Ball], plates: &[Plate], grounds: &[Ground]) -> (Vec<u8>, [usize; 2]) {
     let mut extent = Extent::NOTHING;
     extent.reach(balls, plates);
     paint_over(extent, balls, plates, grounds)
@@ -198,7 +199,7 @@ pub fn paint_over(
     extent: Extent,
     balls: &[Ball],
     plates: &[Plate],
-    grounds: &[[[f64; 2]; 2]],
+    grounds: &[Ground],
 ) -> (Vec<u8>, [usize; 2]) {
     let mut canvas = Canvas::over(extent);
     canvas.lay(grounds);
@@ -220,7 +221,7 @@ mod tests {
             colour,
         };
         let (red, blue) = ([200, 0, 0], [0, 0, 200]);
-        let ground = [[[0.0, 0.0], [0.0, 1.0]]];
+        let ground = [Ground::Behind([[0.0, 0.0], [0.0, 1.0]])];
         for order in [[0, 1], [1, 0]] {
             let balls = [ball(0.0, red, 0.0), ball(5.0, blue, 0.0)];
             let mut balls = Vec::from(balls);
