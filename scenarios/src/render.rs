@@ -7,6 +7,7 @@ use crate::failure::Failure;
 use crate::frames::{CONTINUUM, FIELDS, RIGID, SERIES};
 use crate::report;
 use crate::run::world::pictures::canvas::{Ball, Extent, Plate, paint_over};
+use crate::run::world::pictures::cells::{self, speed};
 use crate::run::world::pictures::{BODY, PLAIN, encode, fastest, palette, speed_colour};
 use crate::run_directory::{ANIMATION, SUMMARY, summary_text, write_in_place};
 use crate::summary::{Figure, Summary};
@@ -148,10 +149,7 @@ fn draw(directory: &Path, request: &Request) -> Result<Figure, Failure> {
             let farthest = farthest.fold(0.0, f64::max);
             instant
                 .plates
-                .extend(behind.plates.into_iter().map(|plate| Plate {
-                    corners: plate.corners.map(|[x, y, depth]| [x, y, depth + farthest]),
-                    ..plate
-                }));
+                .extend(cells::behind(behind.plates, farthest));
         }
         extent.reach(&instant.balls, &instant.plates);
         instants.push(instant);
@@ -306,24 +304,9 @@ fn moving_speeds(frame: &Frame) -> Result<Vec<f64>, String> {
         .collect())
 }
 
-fn speed(v: &[f64; 3]) -> f64 {
-    v.iter().map(|x| x * x).sum::<f64>().sqrt()
-}
-
-/// Corners round the sides of a hexahedron.
-const SIDES: [[usize; 4]; 6] = [
-    [0, 1, 2, 3],
-    [4, 5, 6, 7],
-    [0, 1, 5, 4],
-    [1, 2, 6, 5],
-    [2, 3, 7, 6],
-    [3, 0, 4, 7],
-];
-
 fn instant(frame: &Frame, request: &Request, top: f64) -> Result<Instant, String> {
     let fast = |v: &[f64; 3]| speed_colour(speed(v) / top.max(f64::MIN_POSITIVE));
     let velocity = frame.vectors("velocity")?;
-    let places = frame.points.iter().map(|&p| request.view.axes(p));
     let (mut balls, mut plates) = (Vec::new(), Vec::new());
     match frame.cells {
         Cells::Points => {
@@ -338,6 +321,7 @@ fn instant(frame: &Frame, request: &Request, top: f64) -> Result<Instant, String
                 None => fast(&velocity[k]),
                 Some(&number) => u32::try_from(number).map_or(PLAIN, palette),
             };
+            let places = frame.points.iter().map(|&p| request.view.axes(p));
             balls.extend(places.enumerate().map(|(k, [right, up, depth])| Ball {
                 at: [right, up],
                 depth,
@@ -345,26 +329,7 @@ fn instant(frame: &Frame, request: &Request, top: f64) -> Result<Instant, String
                 colour: colour(k),
             }));
         }
-        Cells::Quadrilaterals => {
-            let corners: Vec<[f64; 3]> = places.collect();
-            for (corners, velocity) in corners.as_chunks::<4>().0.iter().zip(velocity) {
-                let [a, b, c, d] = *corners;
-                let colour = fast(velocity);
-                plates.extend([[a, b, c], [a, c, d]].map(|corners| Plate { corners, colour }));
-            }
-        }
-        Cells::Hexahedra => {
-            let corners: Vec<[f64; 3]> = places.collect();
-            for (corners, velocity) in corners.as_chunks::<8>().0.iter().zip(velocity) {
-                let colour = fast(velocity);
-                for side in SIDES {
-                    let [a, b, c, d] = side.map(|corner| corners[corner]);
-                    plates.extend([[a, b, c], [a, c, d]].map(|corners| Plate { corners, colour }));
-                }
-            }
-        }
-        Cells::Lines => return Err("holds lines, not grains or cells".into()),
-        Cells::Triangles => return Err("holds bodies alone, not grains or cells".into()),
+        _ => plates = cells::plates(frame, |p| request.view.axes(p), top)?,
     }
     Ok(Instant {
         time: frame.time,

@@ -280,7 +280,8 @@ fn follow(run: Followed, under: &mut Under) -> Result<(), Failure> {
         if let Some(averages) = &mut averages {
             averages.take(simulation, &mut seen)?;
         }
-        pictures.take(simulation, 0, steps)?;
+        let behind = recipe.continuum(simulation, state);
+        pictures.take(simulation, behind.as_ref(), 0, steps)?;
     }
     while simulation.steps_done() < steps && course == Course::On {
         let done = simulation.steps_done();
@@ -305,7 +306,10 @@ fn follow(run: Followed, under: &mut Under) -> Result<(), Failure> {
         if let Some(averages) = &mut averages {
             averages.take(simulation, &mut seen)?;
         }
-        pictures.take(simulation, next, steps)?;
+        if pictures.is_due(next, steps) {
+            let behind = recipe.continuum(simulation, state);
+            pictures.take(simulation, behind.as_ref(), next, steps)?;
+        }
         bar.set(next as f64 / steps as f64);
         if course == Course::On {
             under.checkpoint("steps", || {
@@ -316,7 +320,8 @@ fn follow(run: Followed, under: &mut Under) -> Result<(), Failure> {
     bar.clear();
     let done = simulation.steps_done();
     let groups = recipe.groups(simulation, state);
-    pictures.last(simulation, done, groups.as_deref())?;
+    let behind = recipe.continuum(simulation, state);
+    pictures.last(simulation, done, groups.as_deref(), behind.as_ref())?;
     frames.join(done)
 }
 

@@ -2,6 +2,7 @@
 //! projection.
 
 pub(crate) mod canvas;
+pub(crate) mod cells;
 mod grounds;
 
 use super::recipe::Recipe;
@@ -10,6 +11,7 @@ use crate::failure::Failure;
 use crate::run_directory::RunDirectory;
 use crate::scene::world::Materials;
 use crate::summary::Figure;
+use crate::vtkhdf::Frame;
 use canvas::{Ball, Plate};
 use colluvium_dem::{Body, Simulation, Snapshot};
 use grounds::Ground;
@@ -99,19 +101,30 @@ impl<'a> Pictures<'a> {
             .unwrap_or(u64::MAX)
     }
 
-    /// Takes a picture where one is due at this step.
-    pub fn take(&self, simulation: &mut Simulation, step: u64, steps: u64) -> Result<(), Failure> {
+    /// Whether a picture is due at this step.
+    pub fn is_due(&self, step: u64, steps: u64) -> bool {
+        step == 0 || (step < steps && self.next(step - 1, steps) == step)
+    }
+
+    /// Takes a picture where one is due at this step; `continuum` are cells that stand behind the grains.
+    pub fn take(
+        &self,
+        simulation: &mut Simulation,
+        continuum: Option<&Frame>,
+        step: u64,
+        steps: u64,
+    ) -> Result<(), Failure> {
         if step == 0 {
             let first = if self.kinds.len() > 1 {
                 Colouring::Kinds
             } else {
                 Colouring::Speeds
             };
-            self.draw(simulation, first, &[])?;
+            self.draw(simulation, first, &[], continuum)?;
             return self.draw_clumps(simulation);
         }
-        if step < steps && self.next(step - 1, steps) == step {
-            self.draw(simulation, Colouring::Speeds, &[])?;
+        if self.is_due(step, steps) {
+            self.draw(simulation, Colouring::Speeds, &[], continuum)?;
         }
         Ok(())
     }
@@ -122,13 +135,14 @@ impl<'a> Pictures<'a> {
         simulation: &mut Simulation,
         step: u64,
         groups: Option<&[Option<usize>]>,
+        continuum: Option<&Frame>,
     ) -> Result<(), Failure> {
         if step > 0 {
-            self.draw(simulation, Colouring::Speeds, &[])?;
+            self.draw(simulation, Colouring::Speeds, &[], continuum)?;
             self.draw_clumps(simulation)?;
         }
         match groups {
-            Some(groups) => self.draw(simulation, Colouring::Groups, groups),
+            Some(groups) => self.draw(simulation, Colouring::Groups, groups, None),
             None => Ok(()),
         }
     }
@@ -137,7 +151,7 @@ impl<'a> Pictures<'a> {
         if simulation.clump_count() == 0 {
             return Ok(());
         }
-        self.draw(simulation, Colouring::Clumps, &[])
+        self.draw(simulation, Colouring::Clumps, &[], None)
     }
 
     fn draw(
@@ -145,6 +159,7 @@ impl<'a> Pictures<'a> {
         simulation: &mut Simulation,
         colouring: Colouring,
         groups: &[Option<usize>],
+        continuum: Option<&Frame>,
     ) -> Result<(), Failure> {
         let [away, up] = self.view;
         let right = away.cross(&up);
@@ -152,12 +167,12 @@ impl<'a> Pictures<'a> {
         if grains.is_empty() && self.bodies.is_empty() {
             return Ok(());
         }
-        let fastest = fastest(
-            grains
-                .iter()
-                .filter(|g| !g.fixed)
-                .map(|g| g.velocity.norm()),
-        );
+        let moving = grains.iter().filter(|g| !g.fixed);
+        let cells = continuum.map_or(Ok(&[][..]), |frame| frame.vectors("velocity"));
+        let no_picture =
+            |why: String| Failure::Run(format!("cannot make a picture of the continuum: {why}"));
+        let cells = cells.map_err(no_picture)?.iter().map(cells::speed);
+        let fastest = fastest(moving.map(|g| g.velocity.norm()).chain(cells));
         let clumps = match colouring {
             Colouring::Clumps => clumps_by_number(simulation),
             _ => Vec::new(),
@@ -185,7 +200,13 @@ impl<'a> Pictures<'a> {
             })
             .collect();
         let grounds = self.grounds(simulation, &balls, [right, up]);
-        let plates = self.plates(simulation, [right, up, away]);
+        let mut plates = self.plates(simulation, [right, up, away]);
+        if let Some(frame) = continuum {
+            let axes = |p: [f64; 3]| [right, up, away].map(|axis| axis.dot(&Vector3::from(p)));
+            let farthest = balls.iter().map(|ball| ball.depth + ball.radius);
+            let cells = cells::plates(frame, axes, fastest).map_err(no_picture)?;
+            plates.extend(cells::behind(cells, farthest.fold(0.0, f64::max)));
+        }
         let (pixels, size) = canvas::paint(&balls, &plates, &grounds);
         let text = match colouring {
             Colouring::Kinds => self

@@ -34,7 +34,12 @@ impl Ground {
             }
             Shape::Mesh(mesh) => {
                 let seen = |v: &Vector3<f64>| pose.position + pose.outward(v);
-                below(mesh, |v| flat(&seen(v)), |n| edge_on(&pose.outward(n)), ends)
+                below(
+                    mesh,
+                    |v| flat(&seen(v)),
+                    |n| edge_on(&pose.outward(n)),
+                    ends,
+                )
             }
             _ => None,
         }
@@ -101,7 +106,10 @@ mod tests {
                 for [x, z] in pair {
                     vertices.extend([0.0, 5.0].map(|y| Vector3::new(*x, y, *z)));
                 }
-                triangles.extend([[first, first + 2, first + 1], [first + 1, first + 2, first + 3]]);
+                triangles.extend([
+                    [first, first + 2, first + 1],
+                    [first + 1, first + 2, first + 3],
+                ]);
             }
         }
         Shape::Mesh(Arc::new(Mesh::new(vertices, &triangles).unwrap()))
