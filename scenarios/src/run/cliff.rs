@@ -16,6 +16,7 @@ mod watch;
 
 use super::comet::{self, Comet};
 use super::comet_block::CometBlock;
+use super::land::Land;
 use super::world::boulders::boulders;
 use super::world::workshop::Surroundings;
 use super::world::{Course, Expected, Ran, Recipe, Workshop, World, fragments};
@@ -212,11 +213,8 @@ impl Recipe for CliffScene {
         let ground = materials.number("ground", "ground", at)?;
         let land = self.land(origin)?;
         let across = packing.domain.lengths().y;
-        let walls = match &land {
-            None => self.ground(ground, across),
-            Some(land) => vec![self.ground_on(land, ground, across)?],
-        };
-        let fall = (2.0 * self.gravity * (self.shape.height - land::lowest(land.as_ref()))).sqrt();
+        let walls = self.ground_on(land.as_ref(), ground, across)?;
+        let fall = (2.0 * self.gravity * (self.shape.height - Land::span(land.as_ref())[0])).sqrt();
         let mut world = World {
             gravity: -self.gravity * Vector3::z(),
             walls,
@@ -398,7 +396,8 @@ impl Recipe for CliffScene {
             &[("sunk", "sunk on the mean"), ("x_front", "front")],
             "How far what stood before the crack has sunk, and where the debris ends.",
         ));
-        let mut tables = CliffScene::tables(&record, places, deposit, land.as_ref());
+        let tables = record.heap.tables(places.clone(), deposit);
+        let mut tables = Land::beside(land.as_ref(), &places, tables);
         tables.push(sizes);
         Ok(tables)
     }

@@ -4,6 +4,7 @@
 //! gate has gone. Fronts and profiles are taken as those of the continuum (`heap.rs`).
 
 use super::heap::{HeapAxis, HeapCourse, edge};
+use super::land::Land;
 use super::world::workshop::{Surroundings, softened, step_for};
 use super::world::{Course, Expected, Ran, Recipe, Workshop, World, fragments};
 use crate::failure::Failure;
@@ -76,11 +77,12 @@ impl CollapseScene {
         }
     }
 
-    fn domain(&self) -> Domain {
+    fn domain(&self, land: Option<&Land>) -> Domain {
         let d = self.grains.diameter;
+        let [low, high] = Land::span(land);
         Domain {
-            lower: Vector3::new(0.0, 0.0, -2.0 * d),
-            upper: Vector3::new(self.length(), self.slab(), 2.0 * self.height),
+            lower: Vector3::new(0.0, 0.0, low - 2.0 * d),
+            upper: Vector3::new(self.length(), self.slab(), high + 2.0 * self.height),
             periodic: [false, true, false],
         }
     }
@@ -113,6 +115,7 @@ impl CollapseScene {
     fn walls(
         &self,
         materials: &Materials,
+        land: Option<&Land>,
         gate: bool,
         origin: &str,
     ) -> Result<Vec<(String, Wall)>, Failure> {
@@ -121,21 +124,15 @@ impl CollapseScene {
             section: "grains",
         };
         let smooth = materials.number("smooth", "floor", at)?;
-        let below = match self.grains.floor {
-            ColumnFloorKind::Rough => -FLOOR[1] * self.grains.diameter,
-            ColumnFloorKind::Smooth => 0.0,
-        };
         let mut walls = vec![
-            ("mirror", Vector3::zeros(), Vector3::x()),
-            ("floor", below * Vector3::z(), Vector3::z()),
+            ("mirror", Wall::plane(Vector3::zeros(), Vector3::x())),
+            ("floor", self.floor(land)?),
         ];
         if gate {
-            walls.push(("gate", self.width() * Vector3::x(), -self.outward()));
+            let face = Wall::plane(self.width() * Vector3::x(), -self.outward());
+            walls.push(("gate", face));
         }
-        let wall = |(name, point, normal): (&str, Vector3<f64>, Vector3<f64>)| {
-            let wall = Wall::plane(point, normal).material(smooth);
-            (name.to_owned(), wall)
-        };
+        let wall = |(name, wall): (&str, Wall)| (name.to_owned(), wall.material(smooth));
         Ok(walls.into_iter().map(wall).collect())
     }
 
@@ -253,20 +250,25 @@ impl Recipe for CollapseScene {
     }
 
     fn prepare(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure> {
-        let walls = self.walls(shop.materials, true, origin)?;
+        let land = self.land(origin)?;
+        let land = land.as_ref();
+        let walls = self.walls(shop.materials, land, true, origin)?;
         let around = Surroundings {
             walls: walls.into_iter().map(|(_, wall)| wall).collect(),
             gravity: self.down(),
             ..Surroundings::none(shop.materials.laws.clone())
         };
         let d = self.grains.diameter;
-        shop.packing.domain = self.domain();
+        shop.packing.domain = self.domain(land);
         if self.grains.floor == ColumnFloorKind::Rough {
             let [density, thickness] = FLOOR;
             let count = density * self.length() * self.slab() / (d * d);
             let layer = self.over(self.length(), -thickness * d, 0.0);
             let floor = Amount::Grains(count.ceil() as usize);
             shop.insert(layer, floor, Vector3::zeros())?;
+            for grain in &mut shop.packing.grains {
+                grain.position.z += Land::height(land, grain.position.x);
+            }
             shop.glue(&Region::Everywhere)?;
         }
         let (count, height) = self.cloud();
@@ -283,23 +285,33 @@ impl Recipe for CollapseScene {
         };
         shop.relax(&soft, &rest)?;
         let endless = f64::INFINITY;
-        let below = Region::Block {
+        let mut kept = vec![Region::Block {
             lower: Vector3::repeat(-endless),
             upper: Vector3::new(endless, endless, self.height),
-        };
-        shop.trim(&below, true)?;
+        }];
+        if let Some(land) = land {
+            // A floor that rises above the column's top.
+            kept.push(Region::Block {
+                lower: Vector3::new(land.level_up_to(), -endless, -endless),
+                upper: Vector3::repeat(endless),
+            });
+        }
+        shop.trim(&Region::Any(kept), true)?;
         shop.relax(&around, &rest)?;
         shop.measure(&around, &self.middle(), self.gravity)
             .map(drop)
     }
 
     fn world(&self, _: &Packing, materials: &Materials, origin: &str) -> Result<World, Failure> {
+        let land = self.land(origin)?;
+        let land = land.as_ref();
+        let fall = self.height - Land::span(land)[0];
         Ok(World {
-            domain: Some(self.domain()),
+            domain: Some(self.domain(land)),
             gravity: self.down(),
-            walls: self.walls(materials, false, origin)?,
+            walls: self.walls(materials, land, false, origin)?,
             // A free fall through the height, and as fast against each other.
-            speed: 2.0 * (2.0 * self.gravity * self.height).sqrt(),
+            speed: 2.0 * (2.0 * self.gravity * fall).sqrt(),
             ..World::empty(self.duration())
         })
     }
@@ -337,7 +349,18 @@ impl Recipe for CollapseScene {
             ),
             None => "none".into(),
         };
-        vec![("continuum".into(), beside)]
+        let mut lines = vec![("continuum".into(), beside)];
+        if let Some(keys) = &self.terrain {
+            let from = match keys.source().file() {
+                None => "the line of terrain.profile",
+                Some((_, file)) => file,
+            };
+            lines.push((
+                "terrain".into(),
+                format!("{from}, for grains and continuum"),
+            ));
+        }
+        lines
     }
 
     fn steer_every(&self, timestep: f64) -> u64 {
@@ -467,7 +490,9 @@ impl Recipe for CollapseScene {
                     / (ran.simulation.free_mass() * self.gravity * self.grains.diameter)
             ));
         }
-        Ok(course.tables(places, deposit))
+        let land = self.land("")?;
+        let tables = course.tables(places.clone(), deposit);
+        Ok(Land::beside(land.as_ref(), &places, tables))
     }
 
     fn compared(&self) -> Vec<&'static str> {

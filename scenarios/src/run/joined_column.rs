@@ -264,6 +264,25 @@ impl<'a> JoinedColumn<'a> {
         }
     }
 
+    /// Refuses to go on where the continuum with its copy of the overlap has come to a slope: its floor is level.
+    fn stands_on_level_ground(&self, live: &Live) -> Result<(), Failure> {
+        let Some(land) = self.scene.land(&self.origin)? else {
+            return Ok(());
+        };
+        let (x, h) = live.edge.continuum_heights();
+        let least = 0.5 * self.scene.spacing();
+        let filled = x.iter().zip(&h).filter(|(_, h)| **h > least);
+        let reached = filled.fold(0.0, |most: f64, (x, _)| most.max(*x));
+        if reached + least <= land.level_up_to() {
+            return Ok(());
+        }
+        Err(Failure::Run(format!(
+            "the overlap of grains and continuum has come to x = {reached:.4} m, where the ground is no longer level ({} m): grains \
+             have to begin farther back (zones.edge_scaled, zones.tolerance)",
+            land.level_up_to()
+        )))
+    }
+
     fn remember(live: &Live, state: &mut Vec<f64>) {
         let mut edge = Vec::with_capacity(state.len());
         live.edge.write(&mut edge);
@@ -359,6 +378,7 @@ impl Recipe for JoinedColumn<'_> {
         {
             let profile = live.course.fronts.len().is_multiple_of(PROFILE_EVERY);
             self.see(simulation, live, profile);
+            self.stands_on_level_ground(live)?;
             over = self.rests(simulation, live);
         }
         Self::remember(live, state);

@@ -168,9 +168,8 @@ impl CollapseScene {
             let range = "none with model = \"dem\": the slab of grains is periodic across";
             return Err(at("").refuse("side_walls", "a table", range));
         }
-        if self.terrain.is_some() {
-            let range = "none with model = \"dem\": grains collapse on a level floor";
-            return Err(at("").refuse("terrain", "a table", range));
+        if let Some(terrain) = &self.terrain {
+            terrain.check_together(origin)?;
         }
         let (d, least) = (self.grains.diameter, self.height.min(self.width()));
         if d * FEWEST_GRAINS > least {

@@ -4,12 +4,12 @@ use super::STILL_LOOKS;
 use super::debris::Pile;
 use super::record::CliffRecord;
 use super::watch::EDGE;
+use crate::run::land::Land;
 use crate::run::world::Ran;
 use crate::run::world::boulders::size_index;
 use crate::scene::CliffScene;
 use crate::summary::{Quantity, Summary};
 use crate::table::Table;
-use colluvium_continuum::terrain::Profile;
 
 /// What §4.2 of the paper says of the Aswan cliff: the pile's height (m), its distance from the wall (m), the
 /// run-out from there (m), the mean angle of repose (degrees), the share of bonds that survives, the size of the
@@ -96,10 +96,10 @@ impl CliffScene {
         &self,
         heap: [&[f64]; 2],
         d: f64,
-        land: Option<&Profile>,
+        land: Option<&Land>,
         summary: &mut Summary,
     ) {
-        let ground = |x: f64| CliffScene::ground_height(land, x);
+        let ground = |x: f64| Land::height(land, x);
         let pile = Pile::of(heap, 0.0, EDGE * d, ground);
         let of = |f: &dyn Fn(&Pile) -> f64| pile.as_ref().map_or(f64::NAN, f);
         let m = |value: f64| Quantity::new(value, "m");

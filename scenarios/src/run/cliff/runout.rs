@@ -4,6 +4,7 @@
 
 use crate::failure::Failure;
 use crate::run::bagnold::failure;
+use crate::run::land::Land;
 use crate::run::surface_fields::SurfaceFields;
 use crate::scene::CliffScene;
 use crate::vtkhdf::{Cells, Frame};
@@ -286,7 +287,7 @@ pub fn nothing_yet(time: f64) -> Frame {
 impl CliffScene {
     /// The ground of the run-out, from the back of the cliff to an end (m): what stands behind the crack, the wall below
     /// it, and the plane or the land before it.
-    fn left_standing(&self, end: f64, land: Option<&Profile>) -> Result<Profile, Failure> {
+    fn left_standing(&self, end: f64, land: Option<&Land>) -> Result<Profile, Failure> {
         let least = UPRIGHT * self.shape.height;
         let mut points = vec![
             [self.back() - least, self.shape.height],
@@ -302,10 +303,10 @@ impl CliffScene {
             }
             Some(land) => {
                 if self.shape.wall > 0.0 {
-                    points.push([least, Self::ground_height(Some(land), least)]);
+                    points.push([least, Land::height(Some(land), least)]);
                 }
                 let mut last = least;
-                for [x, z] in land.points().iter().filter(|p| p[0] > least) {
+                for [x, z] in land.line().points().iter().filter(|p| p[0] > least) {
                     last = x.max(last + least);
                     points.push([last, *z]);
                 }

@@ -90,8 +90,13 @@ impl Beside<'_> {
 
     fn run(&self, law: [f64; 3], cells: usize, under: &Under) -> Result<Outcome, Failure> {
         let scene = self.scene;
-        let mut collapse =
-            Collapse::new(&self.case(law, cells), &options(scene)).map_err(failure)?;
+        let (case, options) = (self.case(law, cells), options(scene));
+        let ground = scene.land_of_continuum(&under.scene.origin)?;
+        let mut collapse = match &ground {
+            None => Collapse::new(&case, &options),
+            Some(ground) => Collapse::over_ground(&case, &options, ground, None),
+        }
+        .map_err(failure)?;
         let end = scene.duration_scaled * collapse.units().time();
         let threshold = scene.front_height_scaled * scene.height;
         let mut fronts = vec![(0.0, collapse.front(threshold).position)];

@@ -4,6 +4,7 @@ use super::JoinedColumn;
 use crate::failure::Failure;
 use crate::run::column_of_grains::{FLOOR, STILL_LOOKS};
 use crate::run::heap::edge;
+use crate::run::land::Land;
 use crate::run::world::Ran;
 use crate::scene::{ColumnFloorKind, DENSE};
 use crate::state_hash;
@@ -172,7 +173,9 @@ impl JoinedColumn<'_> {
                 .iter()
                 .map(String::as_str),
         );
-        let mut tables = live.course.tables(places.clone(), deposit.clone());
+        let land = scene.land(&self.origin)?;
+        let own = live.course.tables(places.clone(), deposit.clone());
+        let mut tables = Land::beside(land.as_ref(), &places, own);
         tables.extend(sides(self, ran, &live.edge, (places, deposit)));
         if scene.zones.moving {
             tables.extend(moves(scene.edge(), &live.edge, summary));

@@ -3,9 +3,9 @@
 use super::{JoinedCliff, Live};
 use crate::failure::Failure;
 use crate::run::cliff::record::CliffRecord;
+use crate::run::land::Land;
 use crate::run::world::Ran;
 use crate::run::world::boulders::boulders;
-use crate::scene::CliffScene;
 use crate::state_hash;
 use crate::summary::{Figure, Quantity, Summary};
 use crate::table::Table;
@@ -64,7 +64,8 @@ impl JoinedCliff<'_> {
             &[("sunk", "sunk on the mean"), ("x_front", "front")],
             "How far what stood before the crack has sunk while it was grains, and where the debris ends.",
         ));
-        let mut tables = CliffScene::tables(&record, places, deposit, land.as_ref());
+        let tables = record.heap.tables(places.clone(), deposit);
+        let mut tables = Land::beside(land.as_ref(), &places, tables);
         tables.push(sizes);
         Ok(tables)
     }
