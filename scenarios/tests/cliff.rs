@@ -67,12 +67,21 @@ fn debris_runs_out_as_a_continuum() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     succeed(folder.path(), &run("c", &["output.frames=0"]));
+    // Its wedge stands: with the slope of the scene it stays grains, and the run is theirs.
     succeed(
         folder.path(),
-        &run("h", &["model=hybrid", "output.frames=10"]),
+        &run("g", &["model=hybrid", "output.frames=0"]),
+    );
+    assert_eq!(hash(&at("g")), hash(&at("c")));
+    assert!(summary(&at("g"))["results"]["time_of_handover"].is_null());
+    let standing = "runout.steepest_degrees=90";
+    succeed(
+        folder.path(),
+        &run("h", &["model=hybrid", standing, "output.frames=10"]),
     );
     let slippery = [
         "model=hybrid",
+        standing,
         "runout.mu_s=0.01",
         "runout.mu_2=0.01",
         "runout.cohesion=0",
@@ -88,7 +97,7 @@ fn debris_runs_out_as_a_continuum() {
     }
     // The same bits for another number of threads.
     let threads = [
-        &run("t", &["model=hybrid", "output.frames=0"])[..],
+        &run("t", &["model=hybrid", standing, "output.frames=0"])[..],
         &["--threads", "2"],
     ]
     .concat();
@@ -127,6 +136,11 @@ fn bad_cliffs_are_refused_by_key() {
         ("runout.friction=0.4", "runout.friction", "coulomb"),
         ("runout.contact=coulomb", "runout.friction", "coulomb"),
         ("runout.kinetic_share=0", "runout.kinetic_share", "(0, 1]"),
+        (
+            "runout.steepest_degrees=91",
+            "runout.steepest_degrees",
+            "(0, 90]",
+        ),
         ("coarse_graining=400", "coarse_graining", "at most 333.333"),
         ("shape.wall=30", "shape.wall", "below the height"),
         ("shape.overhang_degrees=61", "shape.overhang_degrees", "60"),

@@ -180,7 +180,15 @@ fn a_killed_joined_column_goes_on_in_the_middle_of_an_exchange() {
 /// Before and after its debris has become a continuum.
 #[test]
 fn a_killed_cliff_goes_on_as_grains_and_as_a_continuum() {
-    let sets = [SMALL_COMET_CLIFF, &["model=hybrid", "output.frames=4"]].concat();
+    let sets = [
+        SMALL_COMET_CLIFF,
+        &[
+            "model=hybrid",
+            "runout.steepest_degrees=90",
+            "output.frames=4",
+        ],
+    ]
+    .concat();
     killed_and_whole("cliff", &sets, 13, 5);
 }
 

@@ -16,6 +16,10 @@ pub struct CliffRunoutKeys {
     /// They do once the cliff has failed and their kinetic energy, past its peak, has fallen to this share of it.
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0))]
     pub kinetic_share: f64,
+    /// And they lie no steeper than this (degrees), by the wedge of their area and length: pieces that stand may tip over,
+    /// which a continuum does not. 90: whatever stands.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 90.0))]
+    pub steepest_degrees: f64,
     /// Static friction μ_s of the debris.
     #[schemars(extend("minimum" = 0.0, "maximum" = 10.0))]
     pub mu_s: f64,
@@ -46,6 +50,7 @@ impl Default for CliffRunoutKeys {
     fn default() -> Self {
         Self {
             kinetic_share: 0.1,
+            steepest_degrees: 45.0,
             mu_s: 0.6,
             mu_2: 0.9,
             i_0: 0.3,

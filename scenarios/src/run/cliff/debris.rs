@@ -16,8 +16,8 @@ pub struct Pile {
     pub area: f64,
     /// Its length from the foot of the cliff (m).
     pub length: f64,
-    /// How much higher the ground is where it is highest than where it ends (m).
-    pub descent: f64,
+    /// How much lower the ground is where it ends than where it is highest, and than at the foot of the cliff (m).
+    pub descent: [f64; 2],
 }
 
 impl Pile {
@@ -44,20 +44,21 @@ impl Pile {
             end,
             area,
             length: end - foot,
-            descent: ground(places[top]) - ground(end),
+            descent: [places[top], foot].map(|x| ground(x) - ground(end)),
         })
     }
 
     /// Mean angle of repose (degrees): fall of its surface over run-out, both from its top (Kappel et al. 2020, §4.2).
     pub fn repose_degrees(&self) -> f64 {
-        let fall = self.height + self.descent;
+        let fall = self.height + self.descent[0];
         (fall / (self.end - self.top)).atan().to_degrees()
     }
 
-    /// Slope of the wedge of its area and its length: `tan = 2 A/L²` (degrees). Other than the angle from the
-    /// top it does not hang on where a pile of blocks is highest.
+    /// Slope of the wedge of its area A and its length L on ground that falls by D over it: `tan = (2 A/L + D)/L` (degrees).
+    /// Other than the angle from the top it does not hang on where a pile of blocks is highest.
     pub fn wedge_degrees(&self) -> f64 {
-        (2.0 * self.area / self.length.powi(2)).atan().to_degrees()
+        let fall = 2.0 * self.area / self.length + self.descent[1];
+        (fall / self.length).atan().to_degrees()
     }
 }
 
@@ -125,6 +126,11 @@ mod tests {
         let pile = Pile::of([&places, &heights], 0.0, 0.2, |x| -0.1 * x).unwrap();
         let slope = pile.repose_degrees().to_radians().tan();
         assert!((slope - (10.0 / 24.5 + 0.1)).abs() < 1e-9, "{slope}");
+        let slope = pile.wedge_degrees().to_radians().tan();
+        assert!(
+            (slope - (2.0 * exact / 900.0 + 0.1)).abs() < 2e-3,
+            "{slope}"
+        );
     }
 
     #[test]

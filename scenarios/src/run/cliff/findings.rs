@@ -118,10 +118,9 @@ impl CliffScene {
         let repose = degrees(of(&Pile::repose_degrees));
         let source = "atan(fall of the pile's surface over run-out, from its top); 20 to 30 on 67P (Vincent et al. 2016)";
         summary.put("repose", self.reference(3, repose, source));
-        // A wedge says something on a plane alone.
-        let wedge = of(&|p| land.map_or_else(|| p.wedge_degrees(), |_| f64::NAN));
-        let source = "of the wedge from the foot with the debris' area and length: atan(2 A/L²); null on terrain";
-        summary.put("debris_slope", degrees(wedge).from(source));
+        let wedge = degrees(of(&Pile::wedge_degrees));
+        let source = "of the wedge from the foot with the debris' area and length: atan((2 A/L + D)/L), D fall of the ground";
+        summary.put("debris_slope", wedge.from(source));
         let reach = |p: &Pile| {
             let fall = self.shape.height - ground(p.end);
             (fall / (p.end + self.crack_head())).atan().to_degrees()

@@ -1,17 +1,20 @@
 //! A cliff whose grains become a continuum when it has come down.
 //!
 //! Up to then it is the cliff of grains, the same to the bit: it stands, the crack opens, it fails, falls and hits. Once
-//! the kinetic energy is past its peak and down to a share of it, all that lay before the crack or has come before it
-//! changes hands as a whole (`coupling::handover`); the grains behind are held from then on. The continuum runs out over
+//! the kinetic energy is past its peak and down to a share of it and the debris lies no steeper than a slope (pieces that
+//! stand may tip over, which their contacts decide), all that lay before the crack or has come before it changes hands as a whole (`coupling::handover`); the grains behind are held from then on. The continuum runs out over
 //! what is left of the cliff (`runout.rs`) until it rests.
 
 mod broken;
 mod findings;
 
+use super::debris::Pile;
 use super::record::CliffRecord;
 use super::runout::{Runout, nothing_yet};
+use super::watch::EDGE;
 use super::{STILL, STILL_LOOKS, bonds_that_survive, comet};
 use crate::failure::Failure;
+use crate::run::land::Land;
 use crate::run::world::boulders::boulders;
 use crate::run::world::{Course, Expected, Ran, Recipe, as_the_scene, fragments};
 use crate::scene::CliffScene;
@@ -92,12 +95,27 @@ impl<'a> JoinedCliff<'a> {
     }
 
     /// Whether the grains are to become continuum now.
-    fn is_due(&self, record: &CliffRecord, simulation: &mut Simulation) -> bool {
+    fn is_due(&self, record: &CliffRecord, simulation: &mut Simulation) -> Result<bool, Failure> {
         let [peak, when] = record.times.peak;
         let kinetic = simulation.energy().kinetic();
-        !record.times.failed.is_nan()
+        let calm = !record.times.failed.is_nan()
             && simulation.time() > when
-            && kinetic <= self.scene.runout.kinetic_share * peak
+            && kinetic <= self.scene.runout.kinetic_share * peak;
+        Ok(calm && self.lies(record, simulation)?)
+    }
+
+    /// Whether the debris lies rather than stands.
+    fn lies(&self, record: &CliffRecord, simulation: &mut Simulation) -> Result<bool, Failure> {
+        let Some(d) = self.scene.diameter() else {
+            return Ok(false);
+        };
+        let axis = self.scene.heap_axis(d);
+        let base = record.heap.solid_fraction * simulation.domain().lengths().y;
+        let heights = self.scene.heights(&simulation.grain_list(), &axis, base);
+        let land = self.scene.land(&self.origin)?;
+        let ground = |x: f64| Land::height(land.as_ref(), x);
+        let pile = Pile::of([&axis.positions(), &heights], 0.0, EDGE * d, ground);
+        Ok(pile.is_none_or(|p| p.wedge_degrees() <= self.scene.runout.steepest_degrees))
     }
 
     /// Makes continuum of what lay before the crack or has come before it, and holds the rest.
@@ -163,9 +181,10 @@ impl<'a> JoinedCliff<'a> {
 impl Recipe for JoinedCliff<'_> {
     fn about(&self) -> String {
         format!(
-            "{}; its debris runs out as a continuum once its kinetic energy has fallen to {} of the peak",
+            "{}; its debris runs out as a continuum once its kinetic energy has fallen to {} of the peak and it lies no steeper than {} degrees",
             self.scene.about(),
-            self.scene.runout.kinetic_share
+            self.scene.runout.kinetic_share,
+            self.scene.runout.steepest_degrees
         )
     }
 
@@ -202,9 +221,9 @@ impl Recipe for JoinedCliff<'_> {
         lines.push((
             "zones".into(),
             format!(
-                "grains until the cliff has failed and their kinetic energy has fallen to {} of its peak; then all that lay before \
-                 the crack or has come before it is a continuum",
-                keys.kinetic_share
+                "grains until the cliff has failed, their kinetic energy has fallen to {} of its peak and what came down lies no steeper \
+                 than {} degrees; then all that lay before the crack or has come before it is a continuum",
+                keys.kinetic_share, keys.steepest_degrees
             ),
         ));
         lines.push((
@@ -250,7 +269,7 @@ impl Recipe for JoinedCliff<'_> {
             .diameter()
             .and_then(|d| CliffRecord::read(&memory, columns(d)))
             .ok_or_else(damaged)?;
-        if course == Course::On && self.is_due(&record, simulation) {
+        if course == Course::On && self.is_due(&record, simulation)? {
             *guard = Some(self.hand_over(&record, simulation)?);
         }
         Self::remember(&memory, guard.as_ref(), state);
@@ -308,7 +327,8 @@ impl Recipe for JoinedCliff<'_> {
         let Some(live) = guard.as_ref() else {
             ran.state = memory;
             summary.remarks.push(
-                "All of it stayed grains: it never failed, or never fell to that share of its kinetic energy.".into(),
+                "All of it stayed grains: it never failed, never fell to that share of its kinetic energy, or came to stand more steeply than a continuum would."
+                    .into(),
             );
             return self.scene.conclude(ran, summary);
         };
