@@ -313,6 +313,7 @@ fn remove_old_run(path: &Path) -> std::io::Result<()> {
     let numbered = |name: &String| {
         (name.starts_with("profile_") && name.ends_with(".csv"))
             || (name.starts_with("view_") && name.ends_with(".png"))
+            || (name.starts_with("wall_") && name.ends_with(".vtu"))
     };
     let numbered: Vec<String> = fs::read_dir(path)?
         .filter_map(|entry| entry.ok()?.file_name().into_string().ok())

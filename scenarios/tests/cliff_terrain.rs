@@ -64,6 +64,11 @@ fn debris_runs_down_into_a_valley() {
             assert!((row[2] - exact).abs() < 1e-9, "{out} {row:?}");
         }
     }
+    // The ground is there to be looked at beside the frames.
+    let ground =
+        colluvium::mesh_files::read_surface(&at("grains").join("wall_ground.vtu")).unwrap();
+    let lowest = ground.vertices.iter().map(|v| v.z).fold(0.0, f64::min);
+    assert_eq!((ground.triangles.len(), lowest), (8, -25.0));
     // The angle of reach is that of the line from the crack's head to the end.
     let head = 30.0 * 10f64.to_radians().tan();
     let reach = ((30.0 + 0.25 * grains) / (grains + head)).atan();

@@ -11,6 +11,7 @@ use super::workshop::{Workshop, stand_ins};
 use crate::cost::Cost;
 use crate::failure::Failure;
 use crate::frames::Frames;
+use crate::mesh_files::{self, Surface};
 use crate::progress::Bar;
 use crate::render::render_own;
 use crate::run::{Findings, Under, bed, grain_table, step};
@@ -20,7 +21,7 @@ use crate::scene::world::{Materials, Place};
 use crate::summary::{Model, Quantity, Summary};
 use crate::table::Table;
 use colluvium_dem::preparation::{Coordination, HELD_BY_FRICTION, Packing, RestMeasures};
-use colluvium_dem::{Record, SetupError, Simulation, Snapshot, Threads};
+use colluvium_dem::{Record, SetupError, Shape, Simulation, Snapshot, Threads};
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -242,6 +243,25 @@ struct Followed<'a> {
     pictures: &'a Pictures<'a>,
 }
 
+/// Writes walls of triangles as they stand at the start beside the frames, for ParaView: `wall_NAME.vtu`.
+fn write_walls(stand: &Stand, under: &Under) -> Result<(), Failure> {
+    for (name, wall) in &stand.world.walls {
+        let Shape::Mesh(mesh) = &wall.shape else {
+            continue;
+        };
+        let pose = &wall.pose;
+        let vertices = mesh.vertices().iter();
+        let surface = Surface {
+            vertices: vertices.map(|v| pose.position + pose.outward(v)).collect(),
+            triangles: mesh.corners().to_vec(),
+        };
+        let path = under.directory.file(&format!("wall_{name}.vtu"));
+        mesh_files::write_surface(&path, &surface)
+            .map_err(|error| Failure::Run(error.to_string()))?;
+    }
+    Ok(())
+}
+
 /// Follows the simulation to its end.
 fn follow(run: Followed, under: &mut Under) -> Result<(), Failure> {
     let Followed {
@@ -274,6 +294,9 @@ fn follow(run: Followed, under: &mut Under) -> Result<(), Failure> {
     };
     let mut course = Course::On;
     if simulation.steps_done() == 0 {
+        if recipe.output().frames > 0 {
+            write_walls(stand, under)?;
+        }
         course = recipe.steer(simulation, state)?;
         history.look(recipe, simulation, &mut seen, state);
         take(simulation, &mut seen, state)?;
