@@ -22,6 +22,7 @@ mod collapse_zones;
 mod comet;
 mod contact;
 mod cylinder;
+mod cylinder_of_grains;
 mod error;
 mod friction_keys;
 mod friction_law;
@@ -61,6 +62,7 @@ pub use collapse_zones::{ColumnOverlapKeys, ColumnZoneKeys, DENSE};
 pub use comet::{CometBlockKeys, CometKeys, MixKind, Softness};
 pub use contact::SurfaceKeys;
 pub use cylinder::{CylinderGrid, CylinderScene};
+pub use cylinder_of_grains::{GrainCylinderGrid, GrainCylinderKeys, GrainCylinderScene};
 pub use error::SceneError;
 pub use friction_law::LawVisitor;
 pub use grains::GrainsScene;
@@ -87,7 +89,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// The names and texts of the bundled scenes.
-pub const BUNDLED: [(&str, &str); 22] = [
+pub const BUNDLED: [(&str, &str); 23] = [
     ("incline", include_str!("../scenes/incline.toml")),
     (
         "incline-moderate",
@@ -115,6 +117,10 @@ pub const BUNDLED: [(&str, &str); 22] = [
     (
         "angle-of-repose",
         include_str!("../scenes/angle-of-repose.toml"),
+    ),
+    (
+        "cylinder-of-grains",
+        include_str!("../scenes/cylinder-of-grains.toml"),
     ),
     ("silo", include_str!("../scenes/silo.toml")),
     ("ball-impact", include_str!("../scenes/ball-impact.toml")),

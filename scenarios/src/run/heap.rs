@@ -65,6 +65,32 @@ pub fn edge(positions: &[f64], heights: &[f64], threshold: f64) -> f64 {
     }
 }
 
+/// Height of a profile (places and heights, m) between the places at which it is known; 0 beyond them (m).
+pub fn height_at((x, h): &(Vec<f64>, Vec<f64>), at: f64) -> f64 {
+    let after = x.partition_point(|place| *place < at);
+    match (after.checked_sub(1), x.get(after)) {
+        (_, None) => 0.0,
+        (None, Some(_)) => h[0],
+        (Some(before), Some(_)) => {
+            let share = (at - x[before]) / (x[after] - x[before]);
+            h[before] + share * (h[after] - h[before])
+        }
+    }
+}
+
+/// ∫|h_1 − h_2| w dx over ∫h_1 w dx, at the places of the first.
+pub fn apart(
+    first: &(Vec<f64>, Vec<f64>),
+    second: &(Vec<f64>, Vec<f64>),
+    weight: impl Fn(f64) -> f64,
+) -> f64 {
+    let rows = || first.0.iter().zip(&first.1);
+    let miss: f64 = rows()
+        .map(|(&x, h)| weight(x) * (h - height_at(second, x)).abs())
+        .sum();
+    miss / rows().map(|(&x, h)| weight(x) * h).sum::<f64>()
+}
+
 /// What was seen of a heap in time; it lives in the memory of a recipe.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct HeapCourse {
@@ -111,6 +137,11 @@ impl HeapCourse {
 
     /// What every heap writes: `front`, `deposit` and `profiles`, as the continuum's collapse does.
     pub fn tables(&self, positions: Vec<f64>, deposit: Vec<f64>) -> Vec<Table> {
+        self.tables_along("x", positions, deposit)
+    }
+
+    /// The same along an axis of this name.
+    pub fn tables_along(&self, axis: &str, positions: Vec<f64>, deposit: Vec<f64>) -> Vec<Table> {
         let mut rows: [Vec<f64>; 3] = Default::default();
         for (time, heights) in &self.profiles {
             rows[0].extend(std::iter::repeat_n(*time, heights.len()));
@@ -122,14 +153,14 @@ impl HeapCourse {
         vec![
             Table::new("front")
                 .with("t", "s", column(0))
-                .with("x_front", "m", column(1))
+                .with(&format!("{axis}_front"), "m", column(1))
                 .with("height", "m", column(2)),
             Table::new("deposit")
-                .with("x", "m", positions)
+                .with(axis, "m", positions)
                 .with("h", "m", deposit),
             Table::new("profiles")
                 .with("t", "s", times)
-                .with("x", "m", places)
+                .with(axis, "m", places)
                 .with("h", "m", heights),
         ]
     }
@@ -185,5 +216,18 @@ mod tests {
         course.write(&mut memory);
         assert_eq!(HeapCourse::read(&memory, 3), Some(course));
         assert_eq!(HeapCourse::read(&[], 3), None);
+    }
+
+    #[test]
+    fn deposits_are_compared_by_the_area_between_them() {
+        let flat = (vec![0.5, 1.5, 2.5, 3.5], vec![1.0, 1.0, 1.0, 0.0]);
+        assert_eq!(apart(&flat, &flat, |_| 1.0), 0.0);
+        let higher = (flat.0.clone(), vec![1.5, 1.0, 0.5, 0.0]);
+        assert!((apart(&flat, &higher, |_| 1.0) - 1.0 / 3.0).abs() < 1e-14);
+        assert_eq!(height_at(&higher, 2.0), 0.75);
+        assert_eq!(
+            (height_at(&higher, 0.0), height_at(&higher, 9.0)),
+            (1.5, 0.0)
+        );
     }
 }

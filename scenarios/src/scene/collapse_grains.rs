@@ -79,6 +79,69 @@ impl CalibratedKind {
 /// Fewest grains across the column's height or width.
 const FEWEST_GRAINS: f64 = 4.0;
 
+/// A law of spheres of a diameter (m) and a density (kg/m³) whose linear spring, where it has no stiffness of its own, is
+/// k_n = `scaled` m g/d.
+pub(super) fn scaled_law(
+    law: LawKeys,
+    (diameter, density): (f64, f64),
+    scaled: f64,
+    gravity: f64,
+) -> LawKeys {
+    let mass = density * PI / 6.0 * diameter.powi(3);
+    match (law.parts().normal, law.stiffness) {
+        (NormalKind::Hooke, None) => LawKeys {
+            stiffness: Some(scaled * mass * gravity / diameter),
+            ..law
+        },
+        _ => law,
+    }
+}
+
+/// Spheres of a mean diameter (m) with a relative spread, and walls without friction.
+pub(super) fn spheres_between_smooth_walls(
+    (diameter, spread): (f64, f64),
+    density: f64,
+    contact: LawKeys,
+    origin: &str,
+) -> Result<Materials, SceneError> {
+    let sizes = SizeKeys {
+        law: SizeKind::Gaussian,
+        radius: Some(0.5 * diameter),
+        smallest: None,
+        largest: None,
+        index: None,
+        bins: None,
+        relative_deviation: Some(spread),
+        cut: Some(1.0),
+        radii: None,
+        shares: None,
+        by: None,
+    };
+    let grains = GrainMaterialKeys {
+        density,
+        parts: 1.0,
+        sizes,
+        contact: None,
+    };
+    let reads = contact.parts().reads();
+    let none = |key: &str| reads.contains(&key).then_some(0.0);
+    let smooth = SurfaceKeys {
+        contact: LawKeys {
+            friction: none("friction"),
+            rolling_friction: none("rolling_friction"),
+            twisting_friction: none("twisting_friction"),
+            ..LawKeys::default()
+        },
+    };
+    materials(
+        &BTreeMap::from([("grains".to_owned(), grains)]),
+        &BTreeMap::from([("smooth".to_owned(), smooth)]),
+        &contact,
+        1.0,
+        origin,
+    )
+}
+
 impl CollapseScene {
     /// Width of the column (m).
     pub fn width(&self) -> f64 {
@@ -109,57 +172,20 @@ impl CollapseScene {
 
     /// The contact law, with the stiffness that the scene gives in scaled form.
     pub fn law_keys(&self) -> LawKeys {
-        let grains = &self.grains;
-        let mass = grains.density * PI / 6.0 * grains.diameter.powi(3);
-        let scaled = grains.stiffness_scaled * mass * self.gravity / grains.diameter;
-        match (self.contact.parts().normal, self.contact.stiffness) {
-            (NormalKind::Hooke, None) => LawKeys {
-                stiffness: Some(scaled),
-                ..self.contact
-            },
-            _ => self.contact,
-        }
+        let g = &self.grains;
+        scaled_law(
+            self.contact,
+            (g.diameter, g.density),
+            g.stiffness_scaled,
+            self.gravity,
+        )
     }
 
     /// The grains and the smooth walls.
     pub fn grain_materials(&self, origin: &str) -> Result<Materials, SceneError> {
-        let contact = self.law_keys();
-        let sizes = SizeKeys {
-            law: SizeKind::Gaussian,
-            radius: Some(0.5 * self.grains.diameter),
-            smallest: None,
-            largest: None,
-            index: None,
-            bins: None,
-            relative_deviation: Some(self.grains.spread),
-            cut: Some(1.0),
-            radii: None,
-            shares: None,
-            by: None,
-        };
-        let grains = GrainMaterialKeys {
-            density: self.grains.density,
-            parts: 1.0,
-            sizes,
-            contact: None,
-        };
-        let reads = contact.parts().reads();
-        let none = |key: &str| reads.contains(&key).then_some(0.0);
-        let smooth = SurfaceKeys {
-            contact: LawKeys {
-                friction: none("friction"),
-                rolling_friction: none("rolling_friction"),
-                twisting_friction: none("twisting_friction"),
-                ..LawKeys::default()
-            },
-        };
-        materials(
-            &BTreeMap::from([("grains".to_owned(), grains)]),
-            &BTreeMap::from([("smooth".to_owned(), smooth)]),
-            &contact,
-            1.0,
-            origin,
-        )
+        let g = &self.grains;
+        let sizes = (g.diameter, g.spread);
+        spheres_between_smooth_walls(sizes, g.density, self.law_keys(), origin)
     }
 
     pub(super) fn check_grains(&self, origin: &str) -> Result<(), SceneError> {

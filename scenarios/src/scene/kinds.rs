@@ -4,7 +4,7 @@
 
 use super::{
     AngleOfReposeScene, BallImpactScene, BallModel, BoulderScene, CliffModel, CliffScene,
-    GrainsScene, SceneError, SiloScene, TensileScene, TumblingBoxScene,
+    GrainCylinderScene, GrainsScene, SceneError, SiloScene, TensileScene, TumblingBoxScene,
 };
 use crate::run::ball_impact::joined::JoinedBed;
 use crate::run::cliff::joined::JoinedCliff;
@@ -72,6 +72,8 @@ kinds! {
     Boulder(BoulderScene) = "boulder-drop",
     /// The angle at which an avalanche comes to rest.
     AngleOfRepose(AngleOfReposeScene) = "angle-of-repose",
+    /// A cylinder of grains that collapses.
+    CylinderOfGrains(GrainCylinderScene) = "cylinder-of-grains",
     /// Silos that run out.
     Silo(SiloScene) = "silo",
     /// A ball that falls into a bed.

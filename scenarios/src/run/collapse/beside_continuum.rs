@@ -8,7 +8,7 @@ use crate::cost::Cost;
 use crate::failure::Failure;
 use crate::rheology_file::RheologyFile;
 use crate::run::bagnold::failure;
-use crate::run::heap::edge;
+use crate::run::heap::{apart, edge, height_at};
 use crate::run::{Findings, Under};
 use crate::scene::CollapseScene;
 use crate::summary::{Figure, Quantity};
@@ -36,26 +36,6 @@ impl Outcome {
     fn front(&self, threshold: f64) -> f64 {
         edge(&self.deposit.0, &self.deposit.1, threshold)
     }
-}
-
-/// Where a deposit's height is looked up between the places it is known at; 0 beyond them (m).
-fn height_at((x, h): &(Vec<f64>, Vec<f64>), at: f64) -> f64 {
-    let after = x.partition_point(|place| *place < at);
-    match (after.checked_sub(1), x.get(after)) {
-        (_, None) => 0.0,
-        (None, Some(_)) => h[0],
-        (Some(before), Some(_)) => {
-            let share = (at - x[before]) / (x[after] - x[before]);
-            h[before] + share * (h[after] - h[before])
-        }
-    }
-}
-
-/// ∫|h_1 − h_2| dx over ∫h_1 dx, at the places of the first.
-fn difference(first: &(Vec<f64>, Vec<f64>), second: &(Vec<f64>, Vec<f64>)) -> f64 {
-    let rows = || first.0.iter().zip(&first.1);
-    let miss: f64 = rows().map(|(&x, h)| (h - height_at(second, x)).abs()).sum();
-    miss / rows().map(|(_, h)| h).sum::<f64>()
 }
 
 /// What all runs of the continuum share.
@@ -221,7 +201,7 @@ fn compare(
     );
     put(
         "deposit_difference",
-        difference(&deposit, &whole.deposit),
+        apart(&deposit, &whole.deposit, |_| 1.0),
         "∫|h_grains − h_continuum| dx over the area".into(),
     );
     put(
@@ -247,17 +227,17 @@ fn compare(
     );
     put(
         "deposit_part_of_grid",
-        difference(&whole.deposit, &half.deposit),
+        apart(&whole.deposit, &half.deposit, |_| 1.0),
         format!("∫|h − h_half| dx over the area, {fine} and {coarse} cells"),
     );
     put(
         "deposit_part_of_law",
-        difference(&half.deposit, &stiffer.deposit),
+        apart(&half.deposit, &stiffer.deposit, |_| 1.0),
         "the same, mu_s and mu_2 a standard error higher".into(),
     );
     put(
         "deposit_part_of_reading",
-        difference(&half.deposit, &other.deposit),
+        apart(&half.deposit, &other.deposit, |_| 1.0),
         "the same, the fit for |τ|/σ_zz".into(),
     );
     summary.remarks.push(format!(
@@ -317,22 +297,4 @@ fn compare(
             .with("continuum", "m", theirs),
     );
     Ok(())
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn deposits_are_compared_by_the_area_between_them() {
-        let flat = (vec![0.5, 1.5, 2.5, 3.5], vec![1.0, 1.0, 1.0, 0.0]);
-        assert_eq!(difference(&flat, &flat), 0.0);
-        let higher = (flat.0.clone(), vec![1.5, 1.0, 0.5, 0.0]);
-        assert!((difference(&flat, &higher) - 1.0 / 3.0).abs() < 1e-14);
-        assert_eq!(height_at(&higher, 2.0), 0.75);
-        assert_eq!(
-            (height_at(&higher, 0.0), height_at(&higher, 9.0)),
-            (1.5, 0.0)
-        );
-    }
 }
