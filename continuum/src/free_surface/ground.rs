@@ -89,8 +89,11 @@ pub struct Terrain<S = Profile, const D: usize = DIMENSIONS> {
     pub rise: [usize; D],
 }
 
-/// Cells with a smaller free part are ground.
-const SMALLEST_CELL: f64 = 1e-3;
+/// Cells with a smaller free part are ground: in a plane, and in space, where what is left at a corner is less and the
+/// faces around it are still as wide.
+const SMALLEST_CELL: [f64; 2] = [1e-3, 1e-5];
+/// Cells that miss less of being free are.
+const FULL: f64 = 1e-12;
 /// Faces with a smaller free part are closed.
 const SMALLEST_FACE: f64 = 1e-3;
 /// Smallest free part of the edge of a face with an unknown.
@@ -103,9 +106,8 @@ pub(crate) const DUST: f64 = 1e-9;
 const NEAREST: f64 = 1e-3;
 /// Cells from the ground to the farthest face that others at it may follow.
 const HOSTS: usize = 3;
-/// In space a cell goes with the one above if its way there is no narrower than this part of the widest: cells beside
-/// it may be alike.
-const UPWARDS: f64 = 0.5;
+/// Ways out of a cell that differ by less than this part are alike: then it goes with the cell above.
+const ALIKE: f64 = 1e-9;
 
 /// How ground cuts the cells and faces of a grid.
 #[derive(Debug, Clone)]
@@ -188,7 +190,7 @@ impl<const D: usize> Ground<D> {
         let lines = lines_of(grid, terrain.origin);
         let mut cuts = Cuts::of(grid, &lines, &terrain.shape)?;
         for cell in 0..topology.cells() {
-            if cuts.of_cell(cell).iter().sum::<f64>() < SMALLEST_CELL {
+            if cuts.of_cell(cell).iter().sum::<f64>() < SMALLEST_CELL[D - 2] {
                 cuts.make_solid(topology, cell);
             }
         }
@@ -231,7 +233,7 @@ impl<const D: usize> Ground<D> {
         let count = topology.cells();
         let free: Vec<f64> = (0..count)
             .map(|cell| match cuts.of_cell(cell).iter().sum::<f64>() {
-                all if all > 1.0 - SMALLEST_CELL * 1e-9 => 1.0,
+                all if all > 1.0 - FULL => 1.0,
                 part => part,
             })
             .collect();
@@ -346,7 +348,7 @@ impl<const D: usize> Ground<D> {
                     *next = topology.cell_neighbours[cell][axis][side];
                 }
             }
-            if D > 2 && most > 0.0 && way(cell, D - 1, 1) >= UPWARDS * most {
+            if D > 2 && most > 0.0 && way(cell, D - 1, 1) >= (1.0 - ALIKE) * most {
                 *next = topology.cell_neighbours[cell][D - 1][1];
             }
         }

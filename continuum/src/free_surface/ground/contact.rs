@@ -9,33 +9,16 @@ use crate::wall_friction::{PointLaw, SideWalls, WallFriction};
 
 /// Most cells from whose pressures that of a point is interpolated.
 const MOST_PRESSURES: usize = 12;
-/// The same in a plane.
-const MOST_PRESSURES_IN_PLANE: usize = 4;
 
 /// A sum of pressures times factors, and a pressure that is known.
-#[derive(Clone, Copy)]
+#[derive(Default, Clone, Copy)]
 pub(super) struct Interpolation {
     terms: [(usize, f64); MOST_PRESSURES],
     count: usize,
-    most: usize,
     pub known: f64,
 }
 
 impl Interpolation {
-    /// Nothing, on a grid with so many axes.
-    pub fn nothing(axes: usize) -> Self {
-        Self {
-            terms: [(0, 0.0); MOST_PRESSURES],
-            count: 0,
-            most: if axes == 2 {
-                MOST_PRESSURES_IN_PLANE
-            } else {
-                MOST_PRESSURES
-            },
-            known: 0.0,
-        }
-    }
-
     /// Pressures and their factors.
     pub fn terms(&self) -> &[(usize, f64)] {
         &self.terms[..self.count]
@@ -47,7 +30,7 @@ impl Interpolation {
             .position(|&(p, _)| p == pressure);
         match known {
             Some(n) => self.terms[n].1 += factor,
-            None if self.count < self.most => {
+            None if self.count < MOST_PRESSURES => {
                 self.terms[self.count] = (pressure, factor);
                 self.count += 1;
             }
@@ -74,7 +57,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         around: &[usize; MOST_PARTS],
     ) -> Interpolation {
         let cell = around[place];
-        let mut found = Interpolation::nothing(D);
+        let mut found = Interpolation::default();
         let pressure = |cell: usize| match cell {
             NONE => NONE,
             cell => self.faces.pressure[cell],

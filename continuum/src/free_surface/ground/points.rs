@@ -18,6 +18,25 @@ const STRETCHING_ON_GROUND: f64 = 0.5;
 /// The cells around a corner of one of them, by its sides that are crossed on the way there: one bit for each axis.
 type Around = [usize; MOST_PARTS];
 
+/// Cells around a corner, and one bit for each axis across which they are mirror images.
+struct Mirrored {
+    cells: Around,
+    axes: usize,
+}
+
+impl Mirrored {
+    /// Free parts around the corner.
+    fn parts<const D: usize>(&self, ground: &Ground<D>, corner: usize) -> [f64; MOST_PARTS] {
+        let mut parts = [0.0; MOST_PARTS];
+        for (bits, part) in parts.iter_mut().enumerate().take(points_of(D)) {
+            if self.cells[bits] != NONE {
+                *part = ground.part(self.cells[bits], corner ^ bits & !self.axes);
+            }
+        }
+        parts
+    }
+}
+
 /// The sides of a part of a cell.
 fn sides_of<const D: usize>(corner: usize) -> [usize; D] {
     std::array::from_fn(|axis| corner >> axis & 1)
@@ -48,10 +67,12 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         points: &mut Vec<QuadraturePoint<C, V>>,
         places: &mut Vec<usize>,
     ) {
+        let rows = stretching_rows::<D>(leaning(ground, cell));
         for corner in 0..points_of(D) {
             let side = sides_of::<D>(corner);
             let around = self.cells_around(cell, side);
-            let on_ground = self.share_on_ground(ground, corner, &around);
+            let mirrored = self.mirrored(around);
+            let on_ground = self.share_on_ground(ground, corner, &mirrored);
             let volume = match on_ground {
                 Some(share) => share * ground.part(cell, corner),
                 None => self.material_in_part(ground, cell, corner),
@@ -66,12 +87,20 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 places.push((self.fractions.len() + cell) * points_of(D) + corner);
             }
             let mut point = QuadraturePoint::new(volume * self.grid.cell_volume());
-            for axis in 0..D {
-                for &(row, orientation) in stretching::<D>(axis) {
-                    self.add_stretching_over(ground, cell, axis, (row, orientation), &mut point);
+            for (axis, rows) in rows.iter().enumerate() {
+                for &(row, orientation) in rows {
+                    if orientation != 0.0 {
+                        self.add_stretching_over(
+                            ground,
+                            cell,
+                            axis,
+                            (row, orientation),
+                            &mut point,
+                        );
+                    }
                 }
             }
-            let axis = on_ground.and_then(|_| Self::sticks_along_axis(ground, corner, &around));
+            let axis = on_ground.and_then(|_| Self::sticks_along_axis(ground, corner, &mirrored));
             for high in 1..D {
                 for low in 0..high {
                     self.add_shear_over(ground, corner, &around, [low, high], &mut point);
@@ -85,7 +114,15 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                     point.scale_rate(row, STRETCHING_ON_GROUND);
                 }
             }
-            self.add_pressure_over(ground, around, &mut point);
+            let mut pressure = Interpolation::default();
+            for place in 0..points_of(D) {
+                let share = 1.0 / points_of(D) as f64;
+                pressure.add_all(&self.pressure_over(ground, place, &mirrored.cells), share);
+            }
+            for &(p, factor) in pressure.terms() {
+                point.add_pressure(p, factor);
+            }
+            point.pressure_offset = pressure.known;
             if !point.velocities().is_empty() {
                 points.push(point);
                 places.push(cell * points_of(D) + corner);
@@ -93,32 +130,18 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         }
     }
 
-    /// Adds the mean of the pressures at the centres of the cells around a corner. In space smooth walls are planes of
-    /// symmetry, beyond which lies the same pressure.
-    fn add_pressure_over<const V: usize>(
-        &self,
-        ground: &Ground<D>,
-        mut around: Around,
-        point: &mut QuadraturePoint<C, V>,
-    ) {
-        if D > 2 {
-            for axis in 0..D {
-                if around[1 << axis] == NONE && self.is_smooth(axis, around[0]) {
-                    for bits in (0..points_of(D)).filter(|bits| bits >> axis & 1 == 1) {
-                        around[bits] = around[bits ^ (1 << axis)];
-                    }
+    /// The same cells with mirror images beyond smooth walls of the grid, which in space are planes of symmetry.
+    fn mirrored(&self, mut cells: Around) -> Mirrored {
+        let mut axes = 0;
+        for axis in (0..D).filter(|_| D > 2) {
+            if cells[1 << axis] == NONE && self.is_smooth(axis, cells[0]) {
+                axes |= 1 << axis;
+                for bits in (0..points_of(D)).filter(|bits| bits >> axis & 1 == 1) {
+                    cells[bits] = cells[bits ^ (1 << axis)];
                 }
             }
         }
-        let share = 1.0 / points_of(D) as f64;
-        let mut pressure = Interpolation::nothing(D);
-        for place in 0..points_of(D) {
-            pressure.add_all(&self.pressure_over(ground, place, &around), share);
-        }
-        for &(p, factor) in pressure.terms() {
-            point.add_pressure(p, factor);
-        }
-        point.pressure_offset = pressure.known;
+        Mirrored { cells, axes }
     }
 
     /// Whether the wall of the grid beside a cell across an axis bears no shear; where it is the only one of its axis,
@@ -151,8 +174,8 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
     /// At a corner on the ground the traction acts on all of the ground's surface, however thin the
     /// layer: the factor by which the free part of a cell there counts, so that the parts of cells
     /// without material or with a thin layer of its own friction are made up for.
-    fn share_on_ground(&self, ground: &Ground<D>, corner: usize, around: &Around) -> Option<f64> {
-        let parts = parts_around(ground, corner, around);
+    fn share_on_ground(&self, ground: &Ground<D>, corner: usize, around: &Mirrored) -> Option<f64> {
+        let parts = around.parts(ground, corner);
         let whole = 1.0 / points_of(D) as f64;
         let is_shut = parts[..points_of(D)].contains(&0.0);
         let on_ground = |part: f64| part > 0.0 && (is_shut || part < whole - 1e-12);
@@ -160,7 +183,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             return None;
         }
         let [mut all, mut bearing] = [0.0; 2];
-        for (&cell, part) in around.iter().zip(parts) {
+        for (&cell, part) in around.cells.iter().zip(parts) {
             if on_ground(part) {
                 all += part;
                 if self.fractions[cell] > EMPTY && !self.has_layer(cell) {
@@ -173,15 +196,15 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
 
     /// The axis across which ground lies at a corner if matter sticks to it there, as it does to a wall of the grid: then
     /// what it stretches grows in proportion to the distance from it.
-    fn sticks_along_axis(ground: &Ground<D>, corner: usize, around: &Around) -> Option<usize> {
+    fn sticks_along_axis(ground: &Ground<D>, corner: usize, around: &Mirrored) -> Option<usize> {
         if ground.contact.slides() {
             return None;
         }
-        let mut normal = ground.wall[around[0]];
+        let mut normal = ground.wall[around.cells[0]];
         if normal == [0.0; D] {
             // It lies on faces of the grid: the parts tell on which side. A wall beside the grid is no ground.
-            let parts = parts_around(ground, corner, around);
-            let beyond = (0..D - 1).filter(|axis| around[1 << axis] == NONE);
+            let parts = around.parts(ground, corner);
+            let beyond = (0..D - 1).filter(|axis| around.cells[1 << axis] == NONE);
             let walls = beyond.fold(0, |bits, axis| bits | 1 << axis);
             for bits in 0..points_of(D) {
                 for (axis, n) in normal.iter_mut().enumerate() {
@@ -285,19 +308,57 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
     }
 }
 
-/// Free parts around a corner.
-fn parts_around<const D: usize>(
-    ground: &Ground<D>,
-    corner: usize,
-    around: &Around,
-) -> [f64; MOST_PARTS] {
-    let mut parts = [0.0; MOST_PARTS];
-    for (bits, part) in parts.iter_mut().enumerate().take(points_of(D)) {
-        if around[bits] != NONE {
-            *part = ground.part(around[bits], corner ^ bits);
+/// The horizontal direction that the ground leans to in the cells that share a cell's pressure, in space; none where it is
+/// level or there is none.
+fn leaning<const D: usize>(ground: &Ground<D>, cell: usize) -> Option<[f64; 2]> {
+    let master = ground.master[cell];
+    if D == 2 || master == NONE {
+        return None;
+    }
+    let mut normal = [0.0; D];
+    for member in std::iter::once(master).chain(ground.parts_of(master)) {
+        for (n, wall) in normal.iter_mut().zip(ground.wall[member]) {
+            *n += wall;
         }
     }
-    parts
+    let size = normal[0].hypot(normal[1]);
+    (size > ALONG_AXIS * normal[D - 1].abs()).then(|| [normal[0] / size, normal[1] / size])
+}
+
+/// The rows of the strain rate to which ∂u/∂x of each axis belongs, with their factors.
+///
+/// Of the cells that share a pressure none is free of divergence by itself. What there is of it, d, is no strain of the
+/// material: it is taken off as D − d/2 (e_z e_z + e_h e_h), e_h the horizontal direction that the ground leans to, which is
+/// what the plane flow across such ground does whatever the direction of e_h. (The deviator alone would take off a third
+/// from each axis, and flow in space over ground that is the same all along y would not be plane flow.)
+fn stretching_rows<const D: usize>(leaning: Option<[f64; 2]>) -> [[(usize, f64); 3]; D] {
+    let mut rows = [[(0, 0.0); 3]; D];
+    for (axis, rows) in rows.iter_mut().enumerate() {
+        for (slot, &row) in rows.iter_mut().zip(stretching::<D>(axis)) {
+            *slot = row;
+        }
+    }
+    let Some([x, y]) = leaning else { return rows };
+    // The rows of what is taken off.
+    let taken = [0.5 * x * x, 0.5 * y * y, 0.5];
+    let mut off = [0.0; 2];
+    for (axis, share) in taken.into_iter().enumerate() {
+        for &(row, factor) in stretching::<D>(axis) {
+            off[row] += share * factor;
+        }
+    }
+    for rows in &mut rows {
+        let mut own = [0.0; 2];
+        for &(row, factor) in rows.iter() {
+            own[row] += factor;
+        }
+        *rows = [
+            (0, own[0] - off[0]),
+            (1, own[1] - off[1]),
+            (shear_row::<D>(0, 1), -x * y),
+        ];
+    }
+    rows
 }
 
 /// Free part of the cell around the line between cells that runs through a corner across two axes.
