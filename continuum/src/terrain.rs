@@ -11,6 +11,7 @@
 //! Nothing is sampled, overhangs need no special case, and per cell the free parts of the faces and the
 //! wall close to a vector of zero to round-off.
 
+mod nearest;
 mod profile;
 mod raster;
 mod section;
@@ -21,6 +22,40 @@ pub use raster::HeightRaster;
 pub use surface::Surface;
 
 use crate::error::{Error, require};
+
+/// A shape of ground: what a grid has to know of it.
+pub trait Relief<const N: usize> {
+    /// How the ground cuts the cells of a grid, which it has to span along the horizontal axes.
+    ///
+    /// # Errors
+    /// [`Error::OutOfRange`] for a grid that reaches beyond the ground.
+    fn cut(&self, lines: &GridLines<N>) -> Result<CutCells<N>, Error>;
+
+    /// The distance of points of a grid from the ground's surface (m); what lies far off may count as some cells away.
+    fn distances(&self, lines: &GridLines<N>) -> impl Fn([f64; N]) -> f64;
+}
+
+impl Relief<2> for Profile {
+    fn cut(&self, lines: &GridLines<2>) -> Result<CutCells<2>, Error> {
+        Profile::cut(self, lines)
+    }
+
+    fn distances(&self, _: &GridLines<2>) -> impl Fn([f64; 2]) -> f64 {
+        |point| self.distance(point)
+    }
+}
+
+/// Open terrain: ground below it without end.
+impl Relief<3> for Surface {
+    fn cut(&self, lines: &GridLines<3>) -> Result<CutCells<3>, Error> {
+        Surface::cut(self, lines, false)
+    }
+
+    fn distances(&self, lines: &GridLines<3>) -> impl Fn([f64; 3]) -> f64 {
+        let nearest = nearest::Nearest::new(self, lines);
+        move |point| nearest.distance(point)
+    }
+}
 
 /// A grid of equal cells in N dimensions; the last axis points up.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -70,10 +70,10 @@ fn filled(
         ])
         .unwrap(),
         &Terrain {
-            profile: ground.clone(),
+            shape: ground.clone(),
             origin: [0.0; 2],
             contact,
-            rise: 0,
+            rise: [0; 2],
         },
         between(ground, surface, [cells, rows], h),
         law,
@@ -183,10 +183,10 @@ impl Incline {
         let flow = SurfaceFlow::over_ground(
             Grid::with_moving_surface([x, bounded(h * rows as f64, rows, ROUGH, SMOOTH)]).unwrap(),
             &Terrain {
-                profile: ground.clone(),
+                shape: ground.clone(),
                 origin: [0.0; 2],
                 contact,
-                rise: up,
+                rise: [up, 0],
             },
             between(&ground, &surface, [columns, rows], h),
             law,

@@ -79,13 +79,13 @@ impl<L: ShearLaw + Clone> CollapseCase<L> {
         Ok(Laid {
             grid: self.grid(spacing, rows)?,
             terrain: Terrain {
-                profile: Profile::new(points.map(|p| p.map(|x| x / self.height)).collect())?,
+                shape: Profile::new(points.map(|p| p.map(|x| x / self.height)).collect())?,
                 origin: [0.0, bottom],
                 contact: match ground.contact {
                     Contact::Coulomb(friction) => Contact::Coulomb(friction.in_units(&units)),
                     other => other,
                 },
-                rise: 0,
+                rise: [0; 2],
             },
             spacing,
             counts: [self.cells, rows],
@@ -139,7 +139,7 @@ impl<L: ShearLaw + Clone> CollapseCase<L> {
                 let end: [f64; 2] =
                     std::array::from_fn(|a| (corner[a] + spacing).min(column[a]).max(corner[a]));
                 let size = (end[0] - corner[0]) * (end[1] - corner[1]);
-                let part = (size - terrain.profile.area_in(corner, end)) / (spacing * spacing);
+                let part = (size - terrain.shape.area_in(corner, end)) / (spacing * spacing);
                 part.clamp(0.0, 1.0)
             })
             .collect();

@@ -32,7 +32,8 @@ pub(crate) enum Face {
     Own(usize),
     /// It moves with an unknown of another face.
     Follows(usize),
-    /// It moves with an unknown of the other component, as a thin layer does along a slope.
+    /// It moves with unknowns of other components, as a thin layer does along a slope: the number of its
+    /// [`Faces::sliders`].
     Slides(usize),
     /// It stands still: a wall, or a layer stuck to one.
     Still,
@@ -50,6 +51,8 @@ impl Face {
     }
 }
 
+/// Nothing moves a face.
+pub(super) const NOBODY: [(usize, f64); 2] = [(NONE, 0.0); 2];
 /// Directions whose merits differ by less than this part are alike.
 pub(super) const ALIKE: f64 = 1e-4;
 /// Cells fuller than this are active.
@@ -70,8 +73,11 @@ pub(crate) struct Faces<const D: usize = DIMENSIONS> {
     pub own: Vec<(usize, usize)>,
     /// Whether an unknown velocity belongs to a thin layer on a wall.
     pub is_thin: Vec<bool>,
-    /// Over ground: velocity of each face, and of the edge across it, over the unknown that moves it.
-    pub shares: Option<[Vec<[f64; 2]>; D]>,
+    /// Over ground: velocity of each face, by its own axis, and of the edges across it, by theirs, over the unknown that
+    /// moves it.
+    pub shares: Option<[Vec<[f64; D]>; D]>,
+    /// Unknowns of other components that move a face, and their factors; [`NONE`] where there are fewer.
+    pub sliders: Vec<[(usize, f64); 2]>,
     pub(super) acceleration: [f64; D],
 }
 
@@ -85,6 +91,7 @@ impl<const D: usize> Faces<D> {
             own: Vec::new(),
             is_thin: Vec::new(),
             shares: None,
+            sliders: Vec::new(),
             acceleration,
         }
     }
@@ -319,21 +326,38 @@ impl<const D: usize> Faces<D> {
     pub(crate) fn share(&self, component: usize, face: usize) -> f64 {
         match &self.shares {
             None => 1.0,
-            Some(shares) => shares[component][face][0],
+            Some(shares) => shares[component][face][component],
+        }
+    }
+
+    /// The unknowns that move a face, of whatever component, and how fast it moves, on the face itself or on its edge
+    /// across another axis.
+    #[inline]
+    pub(super) fn moved_by(
+        &self,
+        component: usize,
+        face: usize,
+        across: usize,
+    ) -> [(usize, f64); 2] {
+        match self.role[component][face] {
+            Face::Own(j) | Face::Follows(j) => {
+                let share = self.shares.as_ref().map(|all| all[component][face][across]);
+                [(j, share.unwrap_or(1.0)), NOBODY[1]]
+            }
+            Face::Slides(n) => self.sliders[n],
+            Face::Still | Face::Loose => NOBODY,
         }
     }
 
     /// Gives every face that follows the velocity of its unknown.
     pub(crate) fn spread(&self, unknowns: &[f64], velocity: &mut Velocity<D>) {
-        if let Some(shares) = &self.shares {
-            for ((roles, shares), u) in self.role.iter().zip(shares).zip(velocity) {
-                for ((role, [share, _]), u) in roles.iter().zip(shares).zip(u) {
-                    match role {
-                        Face::Own(j) | Face::Follows(j) | Face::Slides(j) => {
-                            *u = share * unknowns[*j];
-                        }
-                        Face::Still => *u = 0.0,
-                        Face::Loose => {}
+        if self.shares.is_some() {
+            for (component, u) in velocity.iter_mut().enumerate() {
+                for (face, u) in u.iter_mut().enumerate() {
+                    if self.role[component][face] != Face::Loose {
+                        let movers = self.moved_by(component, face, component).into_iter();
+                        let moving = movers.filter(|(j, _)| *j != NONE);
+                        *u = moving.fold(0.0, |u, (j, share)| u + share * unknowns[j]);
                     }
                 }
             }

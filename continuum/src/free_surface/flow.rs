@@ -11,10 +11,9 @@ mod state;
 
 pub use state::{SpaceFields, SpaceState, Spent, SurfaceOptions, SurfaceState, SurfaceStep};
 
-use super::faces::{ACTIVE, Faces, ThinLayer};
+use super::faces::ACTIVE;
 use super::ground::Ground;
 use super::open_ends::Inflow;
-use super::operators::{Material, Operators};
 use super::outside::Outside;
 use super::plane::Plane;
 use super::sliding::SlidingPlaces;
@@ -41,20 +40,6 @@ const MAX_CUTS: usize = 8;
 /// First step from rest, over the time of free fall through a cell.
 const FIRST_STEP: f64 = 0.2;
 
-/// Ground, and what follows from it; so far it is known in a plane only.
-struct Bed<const D: usize, const C: usize, const V: usize> {
-    ground: Ground<D>,
-    faces: RolesOver<D>,
-    operators: OperatorsOver<D, C, V>,
-}
-
-/// Makes the roles of faces over ground.
-type RolesOver<const D: usize> =
-    fn(&Ground<D>, &Topology<D>, &[f64], [f64; D], ThinLayer) -> Faces<D>;
-/// Makes the operators of material over ground.
-type OperatorsOver<const D: usize, const C: usize, const V: usize> =
-    for<'a> fn(&Material<'a, D, C>, &Ground<D>) -> Operators<D, C, V>;
-
 /// A flow with a moving surface, in a plane or in space.
 pub struct SurfaceFlow<
     R,
@@ -73,7 +58,7 @@ pub struct SurfaceFlow<
     transport: Transport<D>,
     side_walls: Option<SideWalls>,
     sliding: SlidingPlaces<D>,
-    bed: Option<Bed<D, C, V>>,
+    bed: Option<Ground<D>>,
     /// What acts from outside.
     outside: Option<Outside<D, C>>,
     /// Impulse of forces from outside that nobody has taken.
@@ -115,7 +100,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
 
     /// Part of each cell that is free of ground.
     pub fn free_parts(&self) -> Option<&[f64]> {
-        self.bed.as_ref().map(|bed| bed.ground.free.as_slice())
+        self.bed.as_ref().map(|ground| ground.free.as_slice())
     }
 
     /// The state.
@@ -344,7 +329,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                 None => {
                     self.state.fractions[cell] > ACTIVE && self.divergence(cell).abs() < DILATES
                 }
-                Some(Bed { ground, .. }) => {
+                Some(ground) => {
                     let fraction = self.state.fractions[cell];
                     fraction > ACTIVE * ground.free[cell]
                         && self.divergence_over(ground, cell).abs() < DILATES
@@ -359,7 +344,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                 courant: std::array::from_fn(|axis| dt / (passes * axes[axis].spacing())),
                 orders: &orders,
                 incompressible: &incompressible,
-                ground: self.bed.as_ref().map(|bed| &bed.ground),
+                ground: self.bed.as_ref(),
                 inflow: self.inflow.as_ref(),
             },
             &mut self.state.fractions,

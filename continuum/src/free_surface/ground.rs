@@ -1,19 +1,21 @@
 //! Ground that cuts the cells of a staggered grid under a flow with a moving surface.
 //!
-//! What is free of ground is known exactly ([`Profile::cut`] on a grid of half the cell size): of each
-//! quarter of a cell, of each face, and of the *edge* across each face, the segment between the centres
-//! of its two cells. Quarters make up the cells, whose faces carry the flux, and the cells around the
-//! corners, whose edges carry the shear:
+//! What is free of ground is known exactly ([`Relief::cut`] on a grid of half the cell size): of each
+//! part of a cell at one of its corners, of each face, and of the *edges* across each face, which reach from the
+//! centre of one of its cells to that of the other: a segment in a plane, in space a rectangle across each of the
+//! other two axes. Parts make up the cells, whose faces carry the flux, and the cells around the lines between
+//! them, whose edges carry the shear:
 //!
 //! ```text
 //! V ∂u/∂x = Σ ± A_f u_f,    V_c ∂u/∂z = Σ ± E_f u_f      (Gauss; the ground has no velocity),
 //! ```
 //!
-//! with A_f the free area of a face, E_f that of its edge, V and V_c the free volumes. Each velocity sees
+//! with A_f the free area of a face, E_f that of an edge, V and V_c the free volumes. Each velocity sees
 //! the same edge from both sides, so a uniform stress exerts no force on any, and a velocity that grows
 //! in proportion to the distance from a plane wall has its exact gradient.
 //!
-//! The unknown of a face is the mean velocity over its edge. The mean over the face itself is larger or
+//! The unknown of a face is the mean velocity over its edge (in space over that across the axis that the ground
+//! leans to; where it leans to two, between them). The means over the face itself and over its edges are larger or
 //! smaller in proportion to the distances of their centres from the ground ([`Ground::swell`]). A face
 //! with less than half of its edge free has no unknown: it moves with the next one away from the ground,
 //! in proportion to its distance. A cell without any unknown belongs to the pressure of a neighbour.
@@ -23,19 +25,22 @@
 //! the ground's surface in each cell against the velocity along it.
 
 pub(crate) mod contact;
+mod cuts;
 pub(crate) mod faces;
+mod layers;
 mod operators;
 mod points;
 mod transport;
 
 use serde::{Deserialize, Serialize};
 
-use super::operators::POINTS;
+use self::cuts::{Cuts, Sheet, centre_of, corner_of_face, lines_of, mean, near};
+use super::operators::points_of;
 use super::plane::Plane;
 use super::topology::{NONE, Topology};
 use crate::error::{Error, require};
 use crate::grid::{Axis, Boundary, DIMENSIONS, Grid};
-use crate::terrain::{CutCells, GridLines, Profile};
+use crate::terrain::{Profile, Relief};
 use crate::wall_friction::WallFriction;
 
 /// What holds on the surface of ground, or on a wall.
@@ -70,21 +75,25 @@ impl Contact {
     }
 }
 
-/// Ground under a flow, in the units of its grid.
+/// Ground under a flow, in the units of its grid: under a [`Profile`] in a plane, under a
+/// [`Surface`](crate::terrain::Surface) in space.
 #[derive(Debug, Clone, PartialEq)]
-pub struct Terrain {
+pub struct Terrain<S = Profile, const D: usize = DIMENSIONS> {
     /// Its surface.
-    pub profile: Profile,
-    /// Position of the lower left corner of the grid.
-    pub origin: [f64; DIMENSIONS],
+    pub shape: S,
+    /// Position of the lower corner of the grid.
+    pub origin: [f64; D],
     /// What holds on it.
     pub contact: Contact,
-    /// Cells by which the ground rises over the period of a periodic axis x.
-    pub rise: usize,
+    /// Cells by which the ground rises along the last axis over the period of each other axis, if that is periodic.
+    pub rise: [usize; D],
 }
 
-/// Cells with a smaller free part are ground.
-const SMALLEST_CELL: f64 = 1e-3;
+/// Cells with a smaller free part are ground: in a plane, and in space, where what is left at a corner is less and the
+/// faces around it are still as wide.
+const SMALLEST_CELL: [f64; 2] = [1e-3, 1e-5];
+/// Cells that miss less of being free are.
+const FULL: f64 = 1e-12;
 /// Faces with a smaller free part are closed.
 const SMALLEST_FACE: f64 = 1e-3;
 /// Smallest free part of the edge of a face with an unknown.
@@ -95,6 +104,10 @@ const LARGEST_SWELL: f64 = 3.0;
 pub(crate) const DUST: f64 = 1e-9;
 /// Distances from the ground are at least this part of a cell.
 const NEAREST: f64 = 1e-3;
+/// Cells from the ground to the farthest face that others at it may follow.
+const HOSTS: usize = 3;
+/// Ways out of a cell that differ by less than this part are alike: then it goes with the cell above.
+const ALIKE: f64 = 1e-9;
 
 /// How ground cuts the cells and faces of a grid.
 #[derive(Debug, Clone)]
@@ -106,14 +119,16 @@ pub(crate) struct Ground<const D: usize = DIMENSIONS> {
     pub solid: Vec<f64>,
     /// Surface of the ground in each cell that it cuts.
     pub planes: Vec<Option<Plane>>,
-    /// Free part of each quarter of a cell, in cells.
-    pub quarters: Vec<[f64; POINTS]>,
+    /// Free part of each part of a cell, in cells, cell by cell.
+    parts_of_cells: Vec<f64>,
     /// Free part of each face.
     pub aperture: [Vec<f64>; D],
-    /// Free part of the edge across each face.
-    pub edge: [Vec<f64>; D],
-    /// Distances of face and edge from the ground.
-    distance: [Vec<[f64; 2]>; D],
+    /// Free part of the edges of each face, by the axis that they lie across.
+    pub edge: [Vec<[f64; D]>; D],
+    /// Distance from the ground of each face, by its own axis, and of its edges, by theirs.
+    distance: [Vec<[f64; D]>; D],
+    /// Distance from the ground at which the unknown of each face is the velocity.
+    reference: [Vec<f64>; D],
     /// Whether a face may have an unknown.
     pub open: [Vec<bool>; D],
     /// The cell whose pressure a cell has; [`NONE`] in ground.
@@ -122,83 +137,6 @@ pub(crate) struct Ground<const D: usize = DIMENSIONS> {
     pub parts: Vec<(usize, usize)>,
     /// ∫ n dA of the ground's surface in each cell, out of the ground.
     pub wall: Vec<[f64; D]>,
-}
-
-/// Halves of the faces and of the lines through the middles of cells that are free.
-struct Halves {
-    quarters: Vec<[f64; POINTS]>,
-    /// For each component and face, its two halves.
-    faces: [Vec<[f64; 2]>; DIMENSIONS],
-    /// For each cell, the halves of the line across it that is normal to an axis.
-    middles: Vec<[[f64; 2]; DIMENSIONS]>,
-}
-
-impl Halves {
-    fn of(grid: &Grid, fine: &CutCells<2>) -> Self {
-        let [columns, rows] = [grid.axes()[0].cells(), grid.axes()[1].cells()];
-        let cells = (0..rows).flat_map(|k| (0..columns).map(move |i| [2 * i, 2 * k]));
-        let quarters = cells.clone().map(|[i, k]| {
-            std::array::from_fn(|q| 0.25 * fine.volume_fraction([i + q % 2, k + q / 2]))
-        });
-        let middles = cells.map(|[i, k]| {
-            [
-                [0, 1].map(|side| fine.aperture(0, [i + 1, k + side])),
-                [0, 1].map(|side| fine.aperture(1, [i + side, k + 1])),
-            ]
-        });
-        let faces = std::array::from_fn(|c| {
-            let [width, height] = grid.faces(c);
-            (0..width * height)
-                .map(|face| {
-                    let index = [2 * (face % width), 2 * (face / width)];
-                    [0, 1].map(|side| {
-                        let mut at = index;
-                        at[1 - c] += side;
-                        fine.aperture(c, at)
-                    })
-                })
-                .collect()
-        });
-        Self {
-            quarters: quarters.collect(),
-            faces,
-            middles: middles.collect(),
-        }
-    }
-
-    /// The halves of the edge across a face, which lie in the cells on both sides of it.
-    fn edge(&self, topology: &Topology, component: usize, face: usize) -> [f64; 2] {
-        let [low, high] = topology.face_cells[component][face];
-        let half = |cell: usize, side: usize| match cell {
-            NONE => 0.0,
-            cell => self.middles[cell][1 - component][side],
-        };
-        [half(low, 1), half(high, 0)]
-    }
-
-    fn make_solid(&mut self, topology: &Topology, cell: usize) {
-        self.quarters[cell] = [0.0; POINTS];
-        self.middles[cell] = [[0.0; 2]; DIMENSIONS];
-        for (axis, pair) in topology.cell_faces[cell].iter().enumerate() {
-            for &face in pair {
-                self.faces[axis][face] = [0.0; 2];
-            }
-        }
-    }
-}
-
-fn mean(halves: [f64; 2]) -> f64 {
-    0.5 * (halves[0] + halves[1])
-}
-
-/// Where the centre of the free part of a segment lies, in its length from its low end.
-fn centre_of(halves: [f64; 2]) -> f64 {
-    let part = mean(halves);
-    match halves[0] - halves[1] {
-        more if more.abs() < 1e-12 => 0.5,
-        more if more > 0.0 => 0.5 * part,
-        _ => 1.0 - 0.5 * part,
-    }
 }
 
 impl<const D: usize> Ground<D> {
@@ -214,6 +152,11 @@ impl<const D: usize> Ground<D> {
         }));
     }
 
+    /// Free part of a part of a cell, in cells.
+    pub(crate) fn part(&self, cell: usize, corner: usize) -> f64 {
+        self.parts_of_cells[cell * points_of(D) + corner]
+    }
+
     /// The other cells that share the pressure of a cell.
     pub(crate) fn parts_of(&self, cell: usize) -> impl Iterator<Item = usize> + '_ {
         let first = self.parts.partition_point(|&(master, _)| master < cell);
@@ -222,41 +165,37 @@ impl<const D: usize> Ground<D> {
             .take_while(move |&&(master, _)| master == cell)
             .map(|&(_, part)| part)
     }
-}
 
-impl Ground {
-    pub(crate) fn new(grid: &Grid, topology: &Topology, terrain: &Terrain) -> Result<Self, Error> {
+    /// Whether the grid is free of it, so that it is no more than the floor below.
+    pub(crate) fn lies_below(&self) -> bool {
+        self.free.iter().all(|free| *free == 1.0)
+    }
+
+    pub(crate) fn new<S: Relief<D>>(
+        grid: &Grid<D>,
+        topology: &Topology<D>,
+        terrain: &Terrain<S, D>,
+    ) -> Result<Self, Error> {
         for axis in grid.axes() {
             require(
                 *axis != Axis::Flat,
                 "terrain",
                 0.0,
-                "a grid with cells along both axes",
+                "a grid with cells along all axes",
             )?;
         }
         if let Contact::Coulomb(friction) = terrain.contact {
             friction.validate()?;
         }
-        let spacing = [0, 1].map(|axis| grid.axes()[axis].spacing());
-        let cells = [0, 1].map(|axis| grid.axes()[axis].cells());
-        let lines = GridLines {
-            origin: terrain.origin,
-            spacing,
-            cells,
-        };
-        let whole = terrain.profile.cut(&lines)?;
-        let fine = terrain.profile.cut(&GridLines {
-            origin: terrain.origin,
-            spacing: spacing.map(|h| 0.5 * h),
-            cells: cells.map(|n| 2 * n),
-        })?;
-        let mut halves = Halves::of(grid, &fine);
+        let lines = lines_of(grid, terrain.origin);
+        let mut cuts = Cuts::of(grid, &lines, &terrain.shape)?;
         for cell in 0..topology.cells() {
-            if halves.quarters[cell].iter().sum::<f64>() < SMALLEST_CELL {
-                halves.make_solid(topology, cell);
+            if cuts.of_cell(cell).iter().sum::<f64>() < SMALLEST_CELL[D - 2] {
+                cuts.make_solid(topology, cell);
             }
         }
-        let mut ground = Self::of_halves(terrain, &lines, topology, &halves);
+        let distance = terrain.shape.distances(&lines);
+        let mut ground = Self::of_cuts(grid, terrain, &distance, topology, &cuts);
         // What no neighbour takes in is ground, which may close off others.
         loop {
             let closed: Vec<usize> = (0..topology.cells())
@@ -266,38 +205,35 @@ impl Ground {
                 break;
             }
             for cell in closed {
-                halves.make_solid(topology, cell);
+                cuts.make_solid(topology, cell);
             }
-            ground = Self::of_halves(terrain, &lines, topology, &halves);
+            ground = Self::of_cuts(grid, terrain, &distance, topology, &cuts);
         }
-        let area = 1.0 / (spacing[0] * spacing[1]).sqrt();
-        for cell in 0..topology.cells() {
-            let index = [cell % cells[0], cell / cells[0]];
-            if let Some(wall) = whole.wall(index) {
-                ground.wall[cell] = wall.area_vector.map(|a| a * area);
-                let [x, z] = wall.normal();
-                if ground.solid[cell] > 0.0 && ground.free[cell] > 0.0 && (x, z) != (0.0, 0.0) {
-                    // In the coordinates of a cell, which need not be a square.
-                    let normal = [x * spacing[0], z * spacing[1], 0.0];
-                    ground.planes[cell] = Some(Plane::of_fraction(normal, ground.solid[cell]));
+        for (cell, wall) in ground.wall.iter().enumerate() {
+            let (solid, free) = (ground.solid[cell], ground.free[cell]);
+            if solid > 0.0 && free > 0.0 && *wall != [0.0; D] {
+                // In the coordinates of a cell, which need not be a cube.
+                let mut normal = [0.0; 3];
+                for (axis, n) in unit(*wall).into_iter().enumerate() {
+                    normal[axis] = n * lines.spacing[axis];
                 }
+                ground.planes[cell] = Some(Plane::of_fraction(normal, solid));
             }
         }
         Ok(ground)
     }
 
-    fn of_halves(
-        terrain: &Terrain,
-        lines: &GridLines<2>,
-        topology: &Topology,
-        halves: &Halves,
+    fn of_cuts<S>(
+        grid: &Grid<D>,
+        terrain: &Terrain<S, D>,
+        distance: &impl Fn([f64; D]) -> f64,
+        topology: &Topology<D>,
+        cuts: &Cuts<D>,
     ) -> Self {
         let count = topology.cells();
-        let free: Vec<f64> = halves
-            .quarters
-            .iter()
-            .map(|quarters| match quarters.iter().sum::<f64>() {
-                all if all > 1.0 - SMALLEST_CELL * 1e-9 => 1.0,
+        let free: Vec<f64> = (0..count)
+            .map(|cell| match cuts.of_cell(cell).iter().sum::<f64>() {
+                all if all > 1.0 - FULL => 1.0,
                 part => part,
             })
             .collect();
@@ -305,62 +241,77 @@ impl Ground {
             contact: terrain.contact,
             solid: free.iter().map(|free| 1.0 - free).collect(),
             planes: vec![None; count],
-            quarters: halves.quarters.clone(),
-            aperture: Default::default(),
-            edge: Default::default(),
-            distance: Default::default(),
-            open: Default::default(),
+            parts_of_cells: cuts.parts.clone(),
+            aperture: std::array::from_fn(|_| Vec::new()),
+            edge: std::array::from_fn(|_| Vec::new()),
+            distance: std::array::from_fn(|_| Vec::new()),
+            reference: std::array::from_fn(|_| Vec::new()),
+            open: std::array::from_fn(|_| Vec::new()),
             master: vec![NONE; count],
             parts: Vec::new(),
-            wall: vec![[0.0; DIMENSIONS]; count],
+            wall: cuts.wall.clone(),
             free,
         };
-        for c in 0..DIMENSIONS {
-            let along = 1 - c;
-            let width = lines.cells[0] + usize::from(c == 0 && topology.faces(0) > count);
-            let closed = |face: usize| {
-                let cells = topology.face_cells[c][face];
-                cells
-                    .iter()
-                    .any(|&cell| cell == NONE || ground.free[cell] == 0.0)
-            };
+        let has_ground = |cell: usize| ground.free[cell] < 1.0 || ground.wall[cell] != [0.0; D];
+        let is_near = near(topology, has_ground, HOSTS);
+        let lines = lines_of(grid, terrain.origin);
+        for c in 0..D {
             for face in 0..topology.faces(c) {
-                let own = halves.faces[c][face];
-                let edge = halves.edge(topology, c, face);
-                let part = mean(own);
+                let cells = topology.face_cells[c][face];
+                let is_closed = cells
+                    .iter()
+                    .any(|&cell| cell == NONE || ground.free[cell] == 0.0);
+                let (index, corner) = corner_of_face(grid, &lines, c, face);
                 // Where rows close on themselves only to have neighbours, nothing passes.
-                let is_seam =
-                    c == 0 && face % width == 0 && face / width + terrain.rise >= lines.cells[1];
-                let aperture =
-                    if closed(face) || part < SMALLEST_FACE || (is_seam && terrain.rise > 0) {
-                        0.0
-                    } else {
-                        part
+                let (last, rise) = (D - 1, terrain.rise[c]);
+                let is_seam = c < last
+                    && rise > 0
+                    && index[c] == 0
+                    && index[last] + rise >= lines.cells[last];
+                let normal = ground.normal_at(topology, c, face);
+                let own = &cuts.faces[c][face];
+                let part = mean::<D>(own, c);
+                let mut edge = [0.0; D];
+                let mut sheets = [[0.0; cuts::MOST_PARTS]; D];
+                for across in (0..D).filter(|&across| across != c) {
+                    sheets[across] = cuts.edge(topology, c, face, across);
+                    edge[across] = mean::<D>(&sheets[across], across);
+                }
+                let is_whole =
+                    part == 1.0 && (0..D).all(|across| across == c || edge[across] == 1.0);
+                let distances = if cells.iter().any(|&cell| cell != NONE && is_near[cell]) {
+                    let place = |across: usize, sheet: &Sheet| {
+                        place_of(&lines, c, corner, across, sheet, normal)
                     };
-                // The lower end of the face, and the middle of its edge.
-                let corner = [0, 1].map(|a| {
-                    lines.origin[a] + [face % width, face / width][a] as f64 * lines.spacing[a]
-                });
-                let mut at = corner;
-                at[along] += centre_of(own) * lines.spacing[along];
-                let mut across = corner;
-                across[along] += 0.5 * lines.spacing[along];
-                across[c] += (centre_of(edge) - 0.5) * lines.spacing[c];
-                let distances = if part == 1.0 && mean(edge) == 1.0 {
-                    [terrain.profile.distance(at); 2]
+                    let mut all = [distance(place(c, own)); D];
+                    for across in (0..D).filter(|&across| across != c && !is_whole) {
+                        all[across] = distance(place(across, &sheets[across]));
+                    }
+                    let nearest = lines.spacing.iter().fold(f64::INFINITY, |m, h| h.min(m));
+                    all.map(|d| d.max(NEAREST * nearest))
                 } else {
-                    [at, across].map(|point| terrain.profile.distance(point))
+                    [lines.spacing[D - 1] * HOSTS as f64; D]
                 };
-                let nearest = NEAREST * lines.spacing[along];
-                let distances = distances.map(|d| d.max(nearest));
+                let weights = weights_of(c, normal);
+                let weighted = |of: &[f64; D]| {
+                    let parts = (0..D).filter(|&across| across != c);
+                    parts.fold(0.0, |sum, across| sum + weights[across] * of[across])
+                };
+                let (centre, reference) = (weighted(&edge), weighted(&distances));
+                let aperture = if is_closed || part < SMALLEST_FACE || is_seam {
+                    0.0
+                } else {
+                    part
+                };
                 ground.aperture[c].push(aperture);
                 // Where matter slides freely it has no velocity of its own beside a closed face.
                 let is_beside = aperture == 0.0 && terrain.contact.slides();
-                ground.edge[c].push(if is_beside { 0.0 } else { mean(edge) });
+                ground.edge[c].push(if is_beside { [0.0; D] } else { edge });
                 ground.distance[c].push(distances);
+                ground.reference[c].push(reference);
                 let is_steady =
-                    terrain.contact.slides() || distances[0] <= LARGEST_SWELL * distances[1];
-                ground.open[c].push(aperture > 0.0 && is_steady && mean(edge) >= SMALLEST_EDGE);
+                    terrain.contact.slides() || distances[c] <= LARGEST_SWELL * reference;
+                ground.open[c].push(aperture > 0.0 && is_steady && centre >= SMALLEST_EDGE);
             }
         }
         ground.join_cells(topology);
@@ -368,20 +319,19 @@ impl Ground {
     }
 
     /// Gives cells without an unknown face of their own to the neighbour that they are most open to.
-    fn join_cells(&mut self, topology: &Topology) {
-        let faces_of = |cell: usize| {
-            (0..DIMENSIONS).flat_map(move |axis| {
-                [0, 1]
-                    .map(|side| (axis, side))
-                    .map(move |(a, s)| (a, s, cell))
-            })
-        };
+    fn join_cells(&mut self, topology: &Topology<D>) {
+        let sides = || (0..D).flat_map(|axis| [(axis, 0), (axis, 1)]);
         let has_own = |cell: usize| {
-            faces_of(cell).any(|(axis, side, cell)| {
+            sides().any(|(axis, side)| {
                 let face = topology.cell_faces[cell][axis][side];
                 face != NONE && self.open[axis][face]
             })
         };
+        let way =
+            |cell: usize, axis: usize, side: usize| match topology.cell_faces[cell][axis][side] {
+                NONE => 0.0,
+                face => self.aperture[axis][face],
+            };
         let mut next: Vec<usize> = vec![NONE; topology.cells()];
         for (cell, next) in next.iter_mut().enumerate() {
             if self.free[cell] == 0.0 {
@@ -392,12 +342,14 @@ impl Ground {
                 continue;
             }
             let mut most = 0.0;
-            for (axis, side, cell) in faces_of(cell) {
-                let face = topology.cell_faces[cell][axis][side];
-                if face != NONE && self.aperture[axis][face] > most {
-                    most = self.aperture[axis][face];
+            for (axis, side) in sides() {
+                if way(cell, axis, side) > most {
+                    most = way(cell, axis, side);
                     *next = topology.cell_neighbours[cell][axis][side];
                 }
+            }
+            if D > 2 && most > 0.0 && way(cell, D - 1, 1) >= (1.0 - ALIKE) * most {
+                *next = topology.cell_neighbours[cell][D - 1][1];
             }
         }
         for cell in 0..next.len() {
@@ -418,30 +370,84 @@ impl Ground {
         self.parts.sort_unstable();
     }
 
+    /// ∫ n dA of the ground's surface in the cells of a face.
+    fn normal_at(&self, topology: &Topology<D>, component: usize, face: usize) -> [f64; D] {
+        let mut normal = [0.0; D];
+        for &cell in &topology.face_cells[component][face] {
+            if cell != NONE {
+                for (n, wall) in normal.iter_mut().zip(self.wall[cell]) {
+                    *n += wall;
+                }
+            }
+        }
+        normal
+    }
+
     /// Whether ground touches a face's surroundings, so that its velocity depends on its distance.
-    pub(crate) fn touches(&self, topology: &Topology, component: usize, face: usize) -> bool {
+    pub(crate) fn touches(&self, topology: &Topology<D>, component: usize, face: usize) -> bool {
+        let edge = &self.edge[component][face];
         self.aperture[component][face] < 1.0
-            || self.edge[component][face] < 1.0
+            || (0..D).any(|across| across != component && edge[across] < 1.0)
             || topology.face_cells[component][face]
                 .iter()
-                .any(|&cell| cell != NONE && self.wall[cell] != [0.0; DIMENSIONS])
+                .any(|&cell| cell != NONE && self.wall[cell] != [0.0; D])
     }
 
-    /// Velocity on an open face over that on its edge.
-    pub(crate) fn swell(&self, component: usize, face: usize) -> f64 {
+    /// Velocity on an open face, by its own axis, and on its edges, by theirs, over its unknown.
+    pub(crate) fn swell(&self, component: usize, face: usize) -> [f64; D] {
         if self.contact.slides() {
-            return 1.0;
+            return [1.0; D];
         }
-        let [own, edge] = self.distance[component][face];
-        own / edge
+        let reference = self.reference[component][face];
+        self.distance[component][face].map(|d| d / reference)
     }
 
-    /// Velocities on a face and on its edge over that on the edge of another one, which it follows.
-    pub(crate) fn shares(&self, component: usize, face: usize, host: (usize, usize)) -> [f64; 2] {
+    /// The same over the unknown of another face, which it follows.
+    pub(crate) fn shares(&self, component: usize, face: usize, host: (usize, usize)) -> [f64; D] {
         if self.contact.slides() {
-            return [1.0; 2];
+            return [1.0; D];
         }
-        let [_, far] = self.distance[host.0][host.1];
+        let far = self.reference[host.0][host.1];
         self.distance[component][face].map(|d| (d / far).min(1.0))
     }
+}
+
+/// A vector over its length.
+pub(super) fn unit<const D: usize>(vector: [f64; D]) -> [f64; D] {
+    let length = vector.iter().map(|x| x * x).sum::<f64>().sqrt();
+    if length > 0.0 {
+        vector.map(|x| x / length)
+    } else {
+        vector
+    }
+}
+
+/// How the edges of a face count, by the axis that they lie across: by how much ground of a normal leans there.
+fn weights_of<const D: usize>(component: usize, normal: [f64; D]) -> [f64; D] {
+    let mut weights = normal.map(|n| n * n);
+    weights[component] = 0.0;
+    if weights.iter().all(|w| *w == 0.0) {
+        weights = [1.0; D];
+        weights[component] = 0.0;
+    }
+    let sum: f64 = weights.iter().sum();
+    weights.map(|w| w / sum)
+}
+
+/// Centre of the free part of a face of a component, or of its edge across another axis.
+fn place_of<const D: usize>(
+    lines: &crate::terrain::GridLines<D>,
+    component: usize,
+    corner: [f64; D],
+    across: usize,
+    sheet: &Sheet,
+    normal: [f64; D],
+) -> [f64; D] {
+    let mut centre = centre_of(sheet, across, normal);
+    if across != component {
+        // An edge lies half in one cell and half in the other, and in their middle.
+        centre[across] = 0.5;
+        centre[component] -= 0.5;
+    }
+    std::array::from_fn(|a| corner[a] + centre[a] * lines.spacing[a])
 }

@@ -425,7 +425,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
 
     /// The pressure at the centre of a cell as an active cell times a factor: its own, or one
     /// extrapolated through the surface.
-    pub(super) fn pressure_at(&self, cell: usize, nearest: f64) -> Option<(usize, f64)> {
+    fn pressure_at(&self, cell: usize, nearest: f64) -> Option<(usize, f64)> {
         if self.faces.pressure[cell] != NONE {
             return Some((self.faces.pressure[cell], 1.0));
         }
@@ -466,7 +466,11 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
 
     /// The same pressure where several ways may be alike, as on the diagonal of what mirrors itself there: the
     /// mean of all.
-    fn pressures_at(&self, cell: usize, nearest: f64) -> [Option<(usize, f64)>; MOST_WAYS] {
+    pub(super) fn pressures_at(
+        &self,
+        cell: usize,
+        nearest: f64,
+    ) -> [Option<(usize, f64)>; MOST_WAYS] {
         let mut all = [None; MOST_WAYS];
         if D == 2 || self.faces.pressure[cell] != NONE {
             all[0] = self.pressure_at(cell, nearest);

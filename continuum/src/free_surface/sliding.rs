@@ -66,6 +66,17 @@ impl<const D: usize> SlidingPlaces<D> {
     }
 }
 
+impl<const D: usize> SlidingPlaces<D> {
+    /// Where the traction of the ground in a cell is kept, on a grid of so many cells.
+    pub(super) fn on_ground(&self, cells: usize, cell: usize) -> usize {
+        if D == 2 {
+            sliding_place(cells, cell)
+        } else {
+            self.end + cell
+        }
+    }
+}
+
 impl<const D: usize, const C: usize> Material<'_, D, C> {
     /// Whether a corner lies on a wall across an axis along which material slides.
     pub(super) fn slides(&self, axis: usize, corner: [usize; D]) -> bool {

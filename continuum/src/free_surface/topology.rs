@@ -36,33 +36,35 @@ fn beside(axis: &Axis, position: usize, count: usize) -> [Option<usize>; 2] {
 
 impl<const D: usize> Topology<D> {
     pub(crate) fn new(grid: &Grid<D>) -> Self {
-        Self::rising(grid, 0)
+        Self::rising(grid, [0; D])
     }
 
-    /// A grid whose periodic axis x meets itself so many cells higher up. Rows close on themselves
+    /// A grid whose periodic axes meet themselves so many cells higher up along the last one. Rows close on themselves
     /// for it, the lowest below the highest: ground below and room above keep them apart.
-    pub(crate) fn rising(grid: &Grid<D>, rise: usize) -> Self {
+    pub(crate) fn rising(grid: &Grid<D>, rise: [usize; D]) -> Self {
         let axes = grid.axes();
         let cells: [usize; D] = std::array::from_fn(|axis| axes[axis].cells());
-        // A step along x beyond an end of the period, and the row that it leads to.
-        let shifted = |row: usize, from: usize, to: usize, count: usize, rows: usize| {
-            let is_over = rise > 0 && count > 2;
-            if is_over && from + 1 == count && to == 0 {
-                (row + rows - rise % rows) % rows
-            } else if is_over && from == 0 && to + 1 == count {
-                (row + rise) % rows
-            } else {
-                row
-            }
-        };
+        // A step beyond an end of the period, and the row that it leads to.
+        let shifted =
+            |rise: usize, row: usize, from: usize, to: usize, count: usize, rows: usize| {
+                let is_over = rise > 0 && count > 2;
+                if is_over && from + 1 == count && to == 0 {
+                    (row + rows - rise % rows) % rows
+                } else if is_over && from == 0 && to + 1 == count {
+                    (row + rise) % rows
+                } else {
+                    row
+                }
+            };
         let replaced =
             |index: [usize; D], axis: usize, position: Option<usize>, counts: [usize; D]| {
                 position.map_or(NONE, |position| {
                     let mut index = index;
-                    if axis == 0 {
-                        let last = D - 1;
+                    let last = D - 1;
+                    if axis < last {
+                        let (row, from) = (index[last], index[axis]);
                         index[last] =
-                            shifted(index[last], index[0], position, counts[0], counts[last]);
+                            shifted(rise[axis], row, from, position, counts[axis], counts[last]);
                     }
                     index[axis] = position;
                     flatten(index, counts)

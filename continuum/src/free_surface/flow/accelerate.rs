@@ -1,11 +1,12 @@
 //! The velocity moves on under gravity, pressure and stress.
 
-use super::{Bed, INACTIVE, SurfaceFlow, SurfaceStep};
+use super::{INACTIVE, SurfaceFlow, SurfaceStep};
 use crate::discretisation::Discretisation;
 use crate::error::Error;
 use crate::free_surface::faces::{Face, Faces};
 use crate::free_surface::fraction::reconstruct;
 use crate::free_surface::ground::DUST;
+use crate::free_surface::ground::faces::faces_over;
 use crate::free_surface::operators::{Material, Operators};
 use crate::free_surface::sliding::some_wall_adheres;
 use crate::free_surface::transport::MASSLESS;
@@ -32,7 +33,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                     thin_layer,
                 )
             }
-            Some(Bed { ground, faces, .. }) => {
+            Some(ground) => {
                 ground.fill(fractions, &mut self.filled);
                 reconstruct(&self.topology, &self.filled, &mut self.planes);
                 // Nor has the surface of matter a plane where there is only ground.
@@ -41,7 +42,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                         *plane = None;
                     }
                 }
-                faces(ground, &self.topology, fractions, acceleration, thin_layer)
+                faces_over(ground, &self.topology, fractions, acceleration, thin_layer)
             }
         };
         if let Some(inflow) = &self.inflow {
@@ -64,7 +65,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             places,
         } = match &self.bed {
             None => material.operators(),
-            Some(bed) => (bed.operators)(&material, &bed.ground),
+            Some(ground) => material.operators_over(ground),
         };
         self.gather(&faces, &places);
         if self.falls_freely(&discretisation, dt) {

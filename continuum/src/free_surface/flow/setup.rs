@@ -1,11 +1,9 @@
 //! How a flow with a moving surface is set up: material at rest on its grid, over ground, between side walls,
 //! with open ends.
 
-use super::{Bed, INACTIVE, SpaceFlow, Spent, SurfaceFlow, SurfaceOptions, SurfaceState};
+use super::{INACTIVE, SpaceFlow, Spent, SurfaceFlow, SurfaceOptions, SurfaceState};
 use crate::discretisation::COMPONENTS;
 use crate::error::{Error, require};
-use crate::free_surface::ground::contact::sliding_place;
-use crate::free_surface::ground::faces::faces_over;
 use crate::free_surface::ground::{Contact, Ground, Terrain};
 use crate::free_surface::open_ends::{Inflow, can_open};
 use crate::free_surface::operators::POINTS;
@@ -14,6 +12,7 @@ use crate::free_surface::topology::{NONE, Topology};
 use crate::free_surface::transport::Transport;
 use crate::grid::{Boundary, DIMENSIONS, Grid};
 use crate::rheology::Rheology;
+use crate::terrain::Relief;
 use crate::wall_friction::SideWalls;
 use crate::yield_step::FlowState;
 
@@ -57,46 +56,6 @@ impl<R: Rheology> SurfaceFlow<R> {
         Ok(self)
     }
 
-    /// Material at rest over ground, in natural units. Fractions are of whole cells, and at most what the
-    /// ground leaves free of each.
-    ///
-    /// # Errors
-    /// Settings out of range, or ground that does not span the grid.
-    pub fn over_ground(
-        grid: Grid,
-        terrain: &Terrain,
-        fractions: Vec<f64>,
-        rheology: R,
-        acceleration: [f64; DIMENSIONS],
-        options: SurfaceOptions,
-    ) -> Result<Self, Error> {
-        let topology = Topology::rising(&grid, terrain.rise);
-        let ground = Ground::new(&grid, &topology, terrain)?;
-        let mut flow = Self::at_rest(grid, fractions, rheology, acceleration, options)?;
-        let full = flow.state.fractions.iter_mut().zip(&ground.free);
-        for (fraction, free) in full {
-            *fraction = fraction.min(*free);
-            // Full but for the round-off of the two ways to the same number.
-            if free - *fraction < FULL_TO {
-                *fraction = *free;
-            }
-        }
-        if let Contact::Coulomb(_) = terrain.contact {
-            let cells = topology.cells();
-            let points = sliding_place(cells, cells);
-            flow.state.stress.resize(points, [0.0; COMPONENTS]);
-        }
-        flow.topology = topology;
-        flow.set_weight_for_pressure();
-        flow.saved.clone_from(&flow.state);
-        flow.bed = Some(Bed {
-            ground,
-            faces: faces_over,
-            operators: |material, ground| material.operators_over(ground),
-        });
-        Ok(flow)
-    }
-
     /// The same flow between side walls at a distance along y, in natural units: they rub on what
     /// moves with 2 c/W + (2 μ/W) p per volume.
     ///
@@ -131,6 +90,62 @@ impl<R: Rheology> SpaceFlow<R> {
 }
 
 impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R, D, C, V> {
+    /// Material at rest over ground, in natural units. Fractions are of whole cells, and at most what the
+    /// ground leaves free of each. Ground that nowhere reaches into the grid, with what holds on the grid's floor, is
+    /// that floor.
+    ///
+    /// # Errors
+    /// Settings out of range, ground that does not span the grid, or walls of the grid that are not at rest or against
+    /// which material slides with friction: over ground they are rough or smooth.
+    pub fn over_ground<S: Relief<D>>(
+        grid: Grid<D>,
+        terrain: &Terrain<S, D>,
+        fractions: Vec<f64>,
+        rheology: R,
+        acceleration: [f64; D],
+        options: SurfaceOptions,
+    ) -> Result<Self, Error> {
+        let floor = grid.axes()[D - 1].boundary_at(0);
+        let topology = Topology::rising(&grid, terrain.rise);
+        let ground = Ground::new(&grid, &topology, terrain)?;
+        if ground.lies_below() && floor == Some(terrain.contact.on_wall()) {
+            return Self::filling(grid, fractions, rheology, acceleration, options);
+        }
+        for axis in grid.axes() {
+            for face in [0, axis.cells()] {
+                let is_plain = matches!(
+                    axis.boundary_at(face),
+                    None | Some(Boundary::FreeSlip | Boundary::NoSlip { velocity: 0.0 })
+                );
+                require(
+                    is_plain,
+                    "grid.boundary",
+                    face as f64,
+                    "smooth walls or rough ones at rest over ground",
+                )?;
+            }
+        }
+        let mut flow = Self::filling(grid, fractions, rheology, acceleration, options)?;
+        let full = flow.state.fractions.iter_mut().zip(&ground.free);
+        for (fraction, free) in full {
+            *fraction = fraction.min(*free);
+            // Full but for the round-off of the two ways to the same number.
+            if free - *fraction < FULL_TO {
+                *fraction = *free;
+            }
+        }
+        if let Contact::Coulomb(_) = terrain.contact {
+            let cells = topology.cells();
+            let points = flow.sliding.on_ground(cells, cells);
+            flow.state.stress.resize(points, [0.0; C]);
+        }
+        flow.topology = topology;
+        flow.set_weight_for_pressure();
+        flow.saved.clone_from(&flow.state);
+        flow.bed = Some(ground);
+        Ok(flow)
+    }
+
     fn filling(
         grid: Grid<D>,
         fractions: Vec<f64>,

@@ -1,26 +1,29 @@
 //! Pressure at the ground, and the friction of ground and side walls.
 
-use super::Ground;
-use super::points::moved_by;
+use super::cuts::{MOST_PARTS, area_of_volume};
+use super::{Ground, unit};
 use crate::discretisation::QuadraturePoint;
-use crate::free_surface::faces::weight_onto;
-use crate::free_surface::operators::{Material, NEAREST_EXTRAPOLATION, POINTS};
+use crate::free_surface::operators::{Material, NEAREST_EXTRAPOLATION, POINTS, points_of};
 use crate::free_surface::topology::NONE;
-use crate::grid::DIMENSIONS;
 use crate::wall_friction::{PointLaw, SideWalls, WallFriction};
 
 /// Most cells from whose pressures that of a point is interpolated.
-const MOST_PRESSURES: usize = 4;
+const MOST_PRESSURES: usize = 12;
 
 /// A sum of pressures times factors, and a pressure that is known.
 #[derive(Default, Clone, Copy)]
 pub(super) struct Interpolation {
-    pub terms: [(usize, f64); MOST_PRESSURES],
-    pub count: usize,
+    terms: [(usize, f64); MOST_PRESSURES],
+    count: usize,
     pub known: f64,
 }
 
 impl Interpolation {
+    /// Pressures and their factors.
+    pub fn terms(&self) -> &[(usize, f64)] {
+        &self.terms[..self.count]
+    }
+
     fn add(&mut self, pressure: usize, factor: f64) {
         let known = self.terms[..self.count]
             .iter()
@@ -38,20 +41,20 @@ impl Interpolation {
 
     pub fn add_all(&mut self, other: &Self, factor: f64) {
         self.known += factor * other.known;
-        for &(pressure, share) in &other.terms[..other.count] {
+        for &(pressure, share) in other.terms() {
             self.add(pressure, factor * share);
         }
     }
 }
 
-impl Material<'_> {
+impl<const D: usize, const C: usize> Material<'_, D, C> {
     /// The pressure at the centre of a cell beside a corner. In ground, and in cells that share the
     /// pressure of another one, it is extrapolated; above the surface through p = 0.
     pub(super) fn pressure_over(
         &self,
-        ground: &Ground,
+        ground: &Ground<D>,
         place: usize,
-        around: [usize; 4],
+        around: &[usize; MOST_PARTS],
     ) -> Interpolation {
         let cell = around[place];
         let mut found = Interpolation::default();
@@ -64,21 +67,24 @@ impl Material<'_> {
             return found;
         }
         if cell != NONE && ground.master[cell] == cell {
-            if ground.wall[cell] != [0.0; DIMENSIONS] {
+            if ground.wall[cell] != [0.0; D] {
                 found.known = self.layer_weight(ground, cell);
-            } else if let Some((p, factor)) = self.pressure_at(cell, NEAREST_EXTRAPOLATION) {
-                found.add(p, factor);
+            } else {
+                let ways = self.pressures_at(cell, NEAREST_EXTRAPOLATION);
+                for (p, factor) in ways.into_iter().flatten() {
+                    found.add(p, factor);
+                }
             }
             return found;
         }
         // Along each axis, from the cell beside it at the same corner, and the one behind that.
         let mut ways = 0.0;
-        for axis in 0..DIMENSIONS {
+        for axis in 0..D {
             let beside = around[place ^ (1 << axis)];
             if pressure(beside) == NONE {
                 let is_layer = beside != NONE
                     && ground.master[beside] == beside
-                    && ground.wall[beside] != [0.0; DIMENSIONS];
+                    && ground.wall[beside] != [0.0; D];
                 if is_layer {
                     found.known += self.layer_weight(ground, beside);
                     ways += 1.0;
@@ -110,40 +116,52 @@ impl Material<'_> {
             }
         }
         if ways == 0.0 {
-            // Across the corner.
-            let across = around[place ^ 3];
-            if pressure(across) != NONE {
-                found.add(pressure(across), 1.0);
+            // Across the lines between cells, and then across the corner.
+            for steps in 2..=D {
+                let across = (0..points_of(D))
+                    .filter(|bits| bits.count_ones() as usize == steps)
+                    .map(|bits| pressure(around[place ^ bits]))
+                    .filter(|p| *p != NONE);
+                let count = across.clone().count();
+                for p in across {
+                    found.add(p, 1.0 / count as f64);
+                }
+                if count > 0 {
+                    break;
+                }
             }
         }
         found
     }
 
     /// The friction of the ground in a cell, against the velocity along it.
-    pub(super) fn sliding(
+    pub(super) fn sliding<const V: usize>(
         &self,
-        ground: &Ground,
+        ground: &Ground<D>,
         friction: WallFriction,
         cell: usize,
-    ) -> Option<QuadraturePoint> {
-        let [x, z] = ground.wall[cell];
-        let length = x.hypot(z);
+    ) -> Option<QuadraturePoint<C, V>> {
+        let wall = ground.wall[cell];
+        let length = wall.iter().map(|x| x * x).sum::<f64>().sqrt();
         if length == 0.0 {
             return None;
         }
-        let normal = [x / length, z / length];
-        let mut point = QuadraturePoint::new(length * self.grid.cell_volume().sqrt());
+        let normal = unit(wall);
+        let area = area_of_volume::<D>(self.grid.cell_volume());
+        let mut point = QuadraturePoint::new(length * area);
         point.law = PointLaw::Sliding(friction);
-        for (axis, along) in [normal[1], -normal[0]].into_iter().enumerate() {
+        let along = tangents(normal);
+        for axis in 0..D {
             let faces = self.topology.cell_faces[cell][axis];
             let areas = faces.map(|face| ground.aperture[axis][face]);
             let sum = areas[0] + areas[1];
-            for (face, area) in faces.into_iter().zip(areas) {
-                if let Some(j) = moved_by(self.faces.role[axis][face])
-                    && area > 0.0
-                {
-                    let share = self.faces.share(axis, face);
-                    point.add_velocity(j, 0, along * share * area / sum);
+            for (face, area) in faces.into_iter().zip(areas).filter(|(_, area)| *area > 0.0) {
+                for (j, share) in self.faces.moved_by(axis, face, axis) {
+                    if j != NONE {
+                        for (row, along) in along.iter().enumerate().take(D - 1) {
+                            point.add_velocity(j, row, along[axis] * share * area / sum);
+                        }
+                    }
                 }
             }
         }
@@ -152,12 +170,12 @@ impl Material<'_> {
     }
 
     /// The pressure on the ground in a cell: extrapolated along the axis that its normal leans to.
-    fn add_pressure_on_ground(
+    fn add_pressure_on_ground<const V: usize>(
         &self,
-        ground: &Ground,
+        ground: &Ground<D>,
         cell: usize,
-        normal: [f64; DIMENSIONS],
-        point: &mut QuadraturePoint,
+        normal: [f64; D],
+        point: &mut QuadraturePoint<C, V>,
     ) {
         let master = ground.master[cell];
         let p = self.faces.pressure[master];
@@ -165,7 +183,14 @@ impl Material<'_> {
             point.pressure_offset = self.layer_weight(ground, cell);
             return;
         }
-        let axis = usize::from(normal[1].abs() >= normal[0].abs());
+        let leans = |most: usize, axis: usize| {
+            if normal[axis].abs() > normal[most].abs() {
+                axis
+            } else {
+                most
+            }
+        };
+        let axis = (0..D).rev().fold(D - 1, leans);
         let away = usize::from(normal[axis] > 0.0);
         // From the centre of the cell that has the pressure to the ground, in cells.
         let mut centre = [0.5; 3];
@@ -197,29 +222,23 @@ impl Material<'_> {
         }
     }
 
-    /// Pressure on the ground under a layer too thin to have one: that of its weight.
-    fn layer_weight(&self, ground: &Ground, cell: usize) -> f64 {
-        let axis = DIMENSIONS - 1;
-        let [thickness, _] = ground.thickness(self.topology, self.fractions, axis, cell);
-        let spacing = self.grid.axes()[axis].spacing();
-        thickness.min(1.0) * spacing * weight_onto(&self.acceleration, axis, 0)
-    }
-
     /// The friction of side walls on a quarter of a cell.
-    pub(super) fn rubbing_over(
+    pub(super) fn rubbing_over<const V: usize>(
         &self,
-        ground: &Ground,
+        ground: &Ground<D>,
         walls: SideWalls,
         cell: usize,
-        side: [usize; DIMENSIONS],
+        side: [usize; D],
         volume: f64,
-    ) -> Option<QuadraturePoint> {
+    ) -> Option<QuadraturePoint<C, V>> {
         let mut point = QuadraturePoint::new(volume * self.grid.cell_volume());
         point.law = PointLaw::SideWalls(walls);
         for (component, side) in side.into_iter().enumerate() {
             let face = self.topology.cell_faces[cell][component][side];
-            if let Some(j) = moved_by(self.faces.role[component][face]) {
-                point.add_velocity(j, component, self.faces.share(component, face));
+            for (j, share) in self.faces.moved_by(component, face, component) {
+                if j != NONE {
+                    point.add_velocity(j, component, share);
+                }
             }
         }
         let p = self.faces.pressure[ground.master[cell]];
@@ -232,7 +251,32 @@ impl Material<'_> {
     }
 }
 
-/// Where the traction of the ground in a cell is kept: after the stresses at corners and at side walls.
+/// Two directions along ground of a unit normal, at right angles; in a plane one.
+fn tangents<const D: usize>(normal: [f64; D]) -> [[f64; D]; 2] {
+    let mut along = [[0.0; D]; 2];
+    if D == 2 {
+        [along[0][0], along[0][1]] = [normal[1], -normal[0]];
+        return along;
+    }
+    // The axis that the normal leans to least, less its part along the normal; then across both.
+    let least = (1..D).fold(0, |least, axis| {
+        if normal[axis].abs() < normal[least].abs() {
+            axis
+        } else {
+            least
+        }
+    });
+    let mut first = normal.map(|n| -n * normal[least]);
+    first[least] += 1.0;
+    along[0] = unit(first);
+    for axis in 0..D {
+        let (u, v) = ((axis + 1) % D, (axis + 2) % D);
+        along[1][axis] = normal[u] * along[0][v] - normal[v] * along[0][u];
+    }
+    along
+}
+
+/// Where the traction of the ground in a cell of a plane is kept: after the stresses at corners and at side walls.
 pub(crate) fn sliding_place(cells: usize, cell: usize) -> usize {
     2 * cells * POINTS + cell
 }

@@ -1,106 +1,14 @@
 //! Which velocities are unknowns over ground.
 //!
 //! Over ground a cell is active if more than half of what is free of it is filled, together with the
-//! cells that share its pressure. A thin layer on a slope has one unknown for its two components, the
-//! one along the axis that the slope leans to; the other one is that times the slope.
+//! cells that share its pressure. A thin layer on a slope has no unknown for its component along the axis that the
+//! ground's normal leans to most; that one is what the others give times the slope.
 
 use super::Ground;
-use crate::free_surface::faces::{ACTIVE, Face, Faces, THINNEST_LAYER, ThinLayer, weight_onto};
+use super::layers::EMPTY;
+use crate::free_surface::faces::{ACTIVE, Face, Faces, NOBODY, THINNEST_LAYER, ThinLayer};
 use crate::free_surface::topology::{NONE, Topology};
 use crate::free_surface::transport::MASSLESS;
-use crate::grid::DIMENSIONS;
-
-/// Cells with less material count as empty beside a thin layer.
-const EMPTY: f64 = 1e-9;
-
-/// How a thin layer lies on a slope, seen from the component of its unknown.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) struct Slope {
-    /// Rise of the ground along the other axis per length along that of the unknown.
-    pub rise: f64,
-    /// Gravity towards the ground along the other axis.
-    pub press: f64,
-    /// Weight onto the ground per mass over |n|, n the component of its normal along the other axis.
-    pub weight: f64,
-}
-
-impl Ground {
-    /// The slope under a face, if ground lies beside it and leans to the axis of its component.
-    pub(crate) fn slope(
-        &self,
-        topology: &Topology,
-        acceleration: [f64; DIMENSIONS],
-        component: usize,
-        face: usize,
-    ) -> Option<Slope> {
-        let mut normal = [0.0; DIMENSIONS];
-        for &cell in &topology.face_cells[component][face] {
-            if cell != NONE {
-                for (n, wall) in normal.iter_mut().zip(self.wall[cell]) {
-                    *n += wall;
-                }
-            }
-        }
-        let length = normal[0].hypot(normal[1]);
-        if length == 0.0 {
-            return None;
-        }
-        let other = 1 - component;
-        let [own, across] = [normal[component] / length, normal[other] / length];
-        if own.abs() > across.abs() || (own.abs() == across.abs() && component == 1) {
-            return None;
-        }
-        let rise = -own / across;
-        let towards = -(acceleration[component] * own + acceleration[other] * across);
-        let is_above = across < 0.0;
-        Some(Slope {
-            rise,
-            press: weight_onto(&acceleration, other, usize::from(is_above)),
-            weight: towards.max(0.0) / across.abs(),
-        })
-    }
-
-    /// Thickness of material and of material and ground together along an axis, in cells, at a cell:
-    /// with the cells on both sides of it, as a layer on a slope may cross rows.
-    pub(crate) fn thickness(
-        &self,
-        topology: &Topology,
-        fractions: &[f64],
-        axis: usize,
-        cell: usize,
-    ) -> [f64; 2] {
-        let mut sums = [fractions[cell], fractions[cell] + self.solid[cell]];
-        for (side, beside) in topology.cell_neighbours[cell][axis].into_iter().enumerate() {
-            if beside != NONE {
-                sums[0] += fractions[beside];
-                sums[1] += fractions[beside] + self.solid[beside];
-            } else if side == 0 {
-                // Below the grid is ground.
-                sums[1] += 1.0;
-            }
-        }
-        sums
-    }
-
-    /// Rise of the surface of a thin layer across a face, in cells along `axis`. Ground that stands out
-    /// beside it does not push it.
-    pub(crate) fn surface_rise(
-        &self,
-        topology: &Topology,
-        fractions: &[f64],
-        axis: usize,
-        [low, high]: [usize; 2],
-    ) -> f64 {
-        let [[low_filled, low_level], [high_filled, high_level]] =
-            [low, high].map(|cell| self.thickness(topology, fractions, axis, cell));
-        let rise = high_level - low_level;
-        if (high_filled <= EMPTY && rise > 0.0) || (low_filled <= EMPTY && rise < 0.0) {
-            0.0
-        } else {
-            rise
-        }
-    }
-}
 
 /// What a face without a role of its own waits for.
 #[derive(Clone, Copy, PartialEq)]
@@ -114,15 +22,15 @@ enum Waiting {
 }
 
 /// Roles of faces over ground.
-pub(crate) fn faces_over(
-    ground: &Ground,
-    topology: &Topology,
+pub(crate) fn faces_over<const D: usize>(
+    ground: &Ground<D>,
+    topology: &Topology<D>,
     fractions: &[f64],
-    acceleration: [f64; DIMENSIONS],
+    acceleration: [f64; D],
     thin_layer: ThinLayer,
-) -> Faces {
+) -> Faces<D> {
     let mut faces = Faces {
-        shares: Some([0, 1].map(|c| vec![[1.0; 2]; topology.faces(c)])),
+        shares: Some(std::array::from_fn(|c| vec![[1.0; D]; topology.faces(c)])),
         ..Faces::empty(topology.cells(), acceleration)
     };
     for cell in 0..topology.cells() {
@@ -139,7 +47,7 @@ pub(crate) fn faces_over(
             faces.active.push(cell);
         }
     }
-    let mut waiting: [Vec<Waiting>; DIMENSIONS] = Default::default();
+    let mut waiting: [Vec<Waiting>; D] = std::array::from_fn(|_| Vec::new());
     for (component, waiting) in waiting.iter_mut().enumerate() {
         for face in 0..topology.faces(component) {
             let (role, waits) = own_role(
@@ -149,10 +57,11 @@ pub(crate) fn faces_over(
             waiting.push(waits);
         }
     }
-    let mut shares = faces.shares.take().unwrap_or_default();
+    let none = || std::array::from_fn(|_| Vec::new());
+    let mut shares = faces.shares.take().unwrap_or_else(none);
     for (j, &(component, face)) in faces.own.iter().enumerate() {
         if !faces.is_thin[j] {
-            shares[component][face] = [ground.swell(component, face), 1.0];
+            shares[component][face] = ground.swell(component, face);
         }
     }
     for (component, waiting) in waiting.iter().enumerate() {
@@ -164,7 +73,7 @@ pub(crate) fn faces_over(
                         faces.role[component][face] = Face::Follows(host);
                         if ground.touches(topology, component, face) {
                             shares[component][face] = if faces.is_thin[host] {
-                                [1.0; 2]
+                                [1.0; D]
                             } else {
                                 ground.shares(component, face, faces.own[host])
                             };
@@ -174,17 +83,13 @@ pub(crate) fn faces_over(
                     }
                 }
                 Waiting::Layer => {
-                    let found = layer_beside(&faces, topology, fractions, component, face);
-                    let slope = found.and_then(|j| {
-                        let (other, beside) = faces.own[j];
-                        Some((j, ground.slope(topology, acceleration, other, beside)?))
-                    });
-                    faces.role[component][face] = match slope {
-                        Some((j, slope)) => {
-                            shares[component][face] = [slope.rise; 2];
-                            Face::Slides(j)
-                        }
-                        None => Face::Still,
+                    let movers =
+                        layers_beside(&faces, ground, topology, fractions, (component, face));
+                    faces.role[component][face] = if movers[0].0 == NONE {
+                        Face::Still
+                    } else {
+                        faces.sliders.push(movers);
+                        Face::Slides(faces.sliders.len() - 1)
                     };
                 }
             }
@@ -194,10 +99,10 @@ pub(crate) fn faces_over(
     faces
 }
 
-fn own_role(
-    faces: &mut Faces,
-    ground: &Ground,
-    topology: &Topology,
+fn own_role<const D: usize>(
+    faces: &mut Faces<D>,
+    ground: &Ground<D>,
+    topology: &Topology<D>,
     fractions: &[f64],
     thin_layer: ThinLayer,
     component: usize,
@@ -214,7 +119,7 @@ fn own_role(
         .all(|&cell| faces.pressure[ground.master[cell]] == NONE);
     if is_thin {
         let mass = topology.face_mean(component, face, fractions);
-        let touches = cells.map(|cell| ground.wall[cell] != [0.0; DIMENSIONS]);
+        let touches = cells.map(|cell| ground.wall[cell] != [0.0; D]);
         if mass <= MASSLESS || touches == [false; 2] || thin_layer == ThinLayer::Following {
             return (Face::Loose, free);
         }
@@ -243,28 +148,39 @@ fn own_role(
     (Face::Own(faces.own.len() - 1), Waiting::No)
 }
 
-/// The thin layer of most mass whose unknown lies beside a face of the other component.
-fn layer_beside(
-    faces: &Faces,
-    topology: &Topology,
+/// The thin layers of most mass, one for each other component, whose unknowns lie beside a face, and its velocity over
+/// theirs.
+fn layers_beside<const D: usize>(
+    faces: &Faces<D>,
+    ground: &Ground<D>,
+    topology: &Topology<D>,
     fractions: &[f64],
-    component: usize,
-    face: usize,
-) -> Option<usize> {
-    let other = 1 - component;
-    let beside = topology.face_cells[component][face]
-        .iter()
-        .flat_map(|&cell| topology.cell_faces[cell][other]);
-    let mut best = None;
-    let mut most = 0.0;
-    for at in beside.filter(|&at| at != NONE) {
-        if let Face::Own(j) = faces.role[other][at] {
-            let mass = topology.face_mean(other, at, fractions);
-            if faces.is_thin[j] && mass > most {
-                most = mass;
-                best = Some(j);
+    (component, face): (usize, usize),
+) -> [(usize, f64); 2] {
+    let mut movers = NOBODY;
+    let mut count = 0;
+    for other in (0..D).filter(|&other| other != component) {
+        let beside = topology.face_cells[component][face]
+            .iter()
+            .flat_map(|&cell| topology.cell_faces[cell][other]);
+        let mut best = None;
+        let mut most = 0.0;
+        for at in beside.filter(|&at| at != NONE) {
+            if let Face::Own(j) = faces.role[other][at] {
+                let mass = topology.face_mean(other, at, fractions);
+                if faces.is_thin[j] && mass > most {
+                    most = mass;
+                    best = Some((j, at));
+                }
             }
         }
+        let slope = best
+            .and_then(|(j, at)| Some((j, ground.slope(topology, faces.acceleration, other, at)?)));
+        // The layer has to lie on the slope that this face stands across.
+        if let Some((j, slope)) = slope.filter(|(_, slope)| slope.axis == component) {
+            movers[count] = (j, slope.rise[other]);
+            count += 1;
+        }
     }
-    best
+    movers
 }

@@ -1,16 +1,13 @@
-//! The discrete operators of material over ground: masses, divergence, pressure, thin layers.
+//! The discrete operators of material over ground: masses, divergence, pressure.
 
-use super::contact::sliding_place;
 use super::{Contact, Ground};
-use crate::discretisation::{Discretisation, Parts, QuadraturePoint};
+use crate::discretisation::{Discretisation, Parts};
 use crate::free_surface::faces::Face;
-use crate::free_surface::operators::{EMPTY, Material, Operators, POINTS};
+use crate::free_surface::operators::{EMPTY, Material, Operators};
 use crate::free_surface::topology::NONE;
-use crate::grid::DIMENSIONS;
-use crate::wall_friction::PointLaw;
 
-impl Material<'_> {
-    pub(crate) fn operators_over(&self, ground: &Ground) -> Operators {
+impl<const D: usize, const C: usize> Material<'_, D, C> {
+    pub(crate) fn operators_over<const V: usize>(&self, ground: &Ground<D>) -> Operators<D, C, V> {
         let count = self.faces.own.len();
         let mut total = vec![0.0; count];
         let mut parts = Parts {
@@ -46,7 +43,7 @@ impl Material<'_> {
                     && let Some(point) = self.sliding(ground, friction, cell)
                 {
                     parts.points.push(point);
-                    places.push(sliding_place(self.fractions.len(), cell));
+                    places.push(self.sliding.on_ground(self.fractions.len(), cell));
                 }
             }
         }
@@ -59,7 +56,7 @@ impl Material<'_> {
     /// Material that a velocity moves, in cells: over the free part of its face, filled as the cells on both
     /// sides are. The pressure then pushes it with the area through which its flux passes. A thin layer is
     /// what lies in both halves.
-    fn filled_part(&self, ground: &Ground, j: usize, component: usize, face: usize) -> f64 {
+    fn filled_part(&self, ground: &Ground<D>, j: usize, component: usize, face: usize) -> f64 {
         let cells = self.topology.face_cells[component][face];
         let free: f64 = cells.iter().map(|&cell| ground.free[cell]).sum();
         if self.faces.is_thin[j] || free == 2.0 {
@@ -69,59 +66,13 @@ impl Material<'_> {
         ground.aperture[component][face] * filled / free
     }
 
-    /// Whether a cell belongs to a thin layer, whose friction acts on its unknown alone.
-    pub(super) fn has_layer(&self, cell: usize) -> bool {
-        (0..DIMENSIONS).any(|axis| {
-            let pair = self.topology.cell_faces[cell][axis];
-            pair.iter().any(|&face| match self.faces.role[axis][face] {
-                Face::Own(j) => self.faces.is_thin[j],
-                Face::Slides(_) => true,
-                _ => false,
-            })
-        })
-    }
-
-    /// Thin layers slide as blocks on their slope: (1 + σ²) m du/dt = m (g_x − |g_z| ∂η/∂x) − friction,
-    /// σ being the rise of the ground and η the height of the layer's surface.
-    fn add_layers(
-        &self,
-        ground: &Ground,
-        total: &[f64],
-        parts: &mut Parts,
-        places: &mut Vec<usize>,
-    ) {
-        for (j, &(component, face)) in self.faces.own.iter().enumerate() {
-            if !self.faces.is_thin[j] {
-                continue;
-            }
-            let slope = ground.slope(self.topology, self.acceleration, component, face);
-            let Some(slope) = slope else { continue };
-            let axis = 1 - component;
-            let spacing = self.grid.axes()[component].spacing();
-            let [low, high] = self.topology.face_cells[component][face];
-            let rise = ground.surface_rise(self.topology, self.fractions, axis, [low, high])
-                * self.grid.axes()[axis].spacing()
-                / spacing;
-            parts.mass[j] *= 1.0 + slope.rise * slope.rise;
-            let g = self.acceleration[component];
-            parts.boundary_load[j] = total[j] * (g - slope.press * rise) - g * parts.mass[j];
-            // Half a cell deep over a whole face: weight times rate is the area of the ground.
-            let mut point = QuadraturePoint::new(0.5 * self.grid.cell_volume());
-            point.add_velocity(j, 1, 2.0 / self.grid.axes()[axis].spacing());
-            point.pressure_offset = total[j] / spacing * slope.weight;
-            point.law = match ground.contact {
-                Contact::Coulomb(friction) => PointLaw::OnWall(friction),
-                _ => PointLaw::Material,
-            };
-            if ground.contact != Contact::FreeSlip && slope.weight > 0.0 {
-                parts.points.push(point);
-                places.push(high * POINTS + component);
-            }
-        }
-    }
-
     /// Divergence of active cells and of those that share their pressure, and the force of it.
-    fn add_pressures(&self, ground: &Ground, total: &[f64], parts: &mut Parts) {
+    fn add_pressures<const V: usize>(
+        &self,
+        ground: &Ground<D>,
+        total: &[f64],
+        parts: &mut Parts<D, C, V>,
+    ) {
         let mut pushed = vec![0.0; total.len()];
         for (axis, roles) in self.faces.role.iter().enumerate() {
             for (face, role) in roles.iter().enumerate() {
@@ -134,30 +85,24 @@ impl Material<'_> {
         }
         for (p, &cell) in self.faces.active.iter().enumerate() {
             for member in std::iter::once(cell).chain(ground.parts_of(cell)) {
-                for axis in 0..DIMENSIONS {
+                for axis in 0..D {
                     for side in 0..2 {
                         let face = self.topology.cell_faces[member][axis][side];
                         if face == NONE {
                             continue;
                         }
-                        let (j, is_own) = match self.faces.role[axis][face] {
-                            Face::Own(j) => (j, true),
-                            Face::Follows(j) | Face::Slides(j) => (j, false),
-                            Face::Still | Face::Loose => continue,
-                        };
+                        let role = self.faces.role[axis][face];
                         let outwards = if side == 1 { 1.0 } else { -1.0 };
-                        let area = self.grid.face_area(axis)
-                            * ground.aperture[axis][face]
-                            * self.faces.share(axis, face);
+                        let area = self.grid.face_area(axis) * ground.aperture[axis][face];
                         // A face that follows pushes with the pressures beside it where both are known; else
                         // its mass goes with the gradient at the face that leads it.
                         let other = self.topology.cell_neighbours[member][axis][side];
-                        let mass = if is_own {
-                            total[j] - pushed[j]
-                        } else if self.pushes(ground, j, axis, face) {
-                            self.grid.cell_volume() * self.filled_part(ground, j, axis, face)
-                        } else {
-                            0.0
+                        let mass = match role {
+                            Face::Own(j) => total[j] - pushed[j],
+                            Face::Follows(j) if self.pushes(ground, j, axis, face) => {
+                                self.grid.cell_volume() * self.filled_part(ground, j, axis, face)
+                            }
+                            _ => 0.0,
                         };
                         let mut force = 0.0;
                         if mass > 0.0 {
@@ -168,8 +113,12 @@ impl Material<'_> {
                             };
                             force = outwards * mass / (distance * self.grid.axes()[axis].spacing());
                         }
-                        parts.divergence.push((p, j, outwards * area));
-                        parts.gradient.push(force);
+                        for (j, share) in self.faces.moved_by(axis, face, axis) {
+                            if j != NONE {
+                                parts.divergence.push((p, j, outwards * area * share));
+                                parts.gradient.push(force);
+                            }
+                        }
                     }
                 }
             }
@@ -179,7 +128,7 @@ impl Material<'_> {
     /// Whether a face that follows pushes with the pressures beside it: where matter slides on the ground and
     /// it lies between two cells with pressures of their own. Pressure then has no force along plane ground.
     /// (Where matter stands still at it, the gradient at the leading face is the better one.)
-    fn pushes(&self, ground: &Ground, j: usize, component: usize, face: usize) -> bool {
+    fn pushes(&self, ground: &Ground<D>, j: usize, component: usize, face: usize) -> bool {
         ground.contact.slides()
             && ground.aperture[component][face] > 0.0
             && self.faces.own[j].0 == component
