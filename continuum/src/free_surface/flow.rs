@@ -175,9 +175,14 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
 
     /// Largest Σ |u|/h of a cell with material.
     fn largest_rate(&self) -> f64 {
+        self.largest_rate_above(MASSLESS)
+    }
+
+    /// Largest Σ |u|/h of a cell that is filled by more than this part.
+    fn largest_rate_above(&self, least: f64) -> f64 {
         let mut most = 0.0_f64;
         for (cell, &fraction) in self.state.fractions.iter().enumerate() {
-            if fraction <= MASSLESS {
+            if fraction <= least {
                 continue;
             }
             let mut rate = 0.0;
@@ -216,11 +221,14 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         most.min(by_courant).min(self.options.largest_step)
     }
 
-    /// The next step may be as long as the present velocity allows, and at most `limit`, however short the last one was:
-    /// for velocities and fractions that were set from outside.
+    /// The next step may be as long as the present velocity of cells with a pressure of their own allows, and at most
+    /// `limit`, however short the last one was: for velocities and fractions that were set from outside. Cells with less are
+    /// moved in passes as short as they need.
     pub fn renew_step(&mut self, limit: f64) {
         if self.state.next_step > 0.0 {
-            self.state.next_step = self.allowed_step(f64::INFINITY).min(limit);
+            let rate = self.largest_rate_above(ACTIVE).max(1e-300);
+            let allowed = (self.options.courant / rate).min(self.options.largest_step);
+            self.state.next_step = allowed.min(limit);
         }
     }
 

@@ -14,6 +14,8 @@
 use super::MaterialEdge;
 use super::cells::over;
 
+/// A step planned as long as an exchange but for round-off would be made in two halves.
+pub(super) const ROUNDED: f64 = 1.0 + 1e-6;
 /// Cells with less than this part of a full cell's mass in grains have no velocity to follow.
 const LEAST: f64 = 0.05;
 
@@ -74,7 +76,7 @@ impl MaterialEdge {
         }
         self.collapse.set_state(state)?;
         let exchange = self.exchange_time() / self.collapse.units().time();
-        self.collapse.flow_mut().renew_step(exchange);
+        self.collapse.flow_mut().renew_step(ROUNDED * exchange);
         self.account.copied += self.collapse.flow().volume() - before.0;
         let now = self.continuum_momentum();
         let changes = now.iter().zip(before.1);

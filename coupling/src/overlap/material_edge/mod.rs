@@ -243,7 +243,7 @@ impl MaterialEdge {
         let exchange = loads * load_time / (column.height / column.gravity).sqrt();
         let mut options = spec.options;
         if exchange < NEARLY * options.largest_step {
-            options.largest_step = options.largest_step.max(exchange);
+            options.largest_step = options.largest_step.max(copy::ROUNDED * exchange);
         }
         let collapse = Collapse::new(&column, &options)?;
         let axes = collapse.flow().grid().axes();
