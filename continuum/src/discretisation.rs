@@ -80,6 +80,41 @@ impl<const C: usize, const V: usize> QuadraturePoint<C, V> {
         self.rates[component][slot] += coefficient;
     }
 
+    /// The same point of a problem in which only some unknowns are left, by their new numbers; the others keep the
+    /// values given.
+    pub(crate) fn restricted(
+        &self,
+        velocities: &[Option<usize>],
+        cells: &[Option<usize>],
+        u: &[f64],
+        p: &[f64],
+    ) -> Self {
+        let mut point = Self {
+            offset: self.offset,
+            pressure_offset: self.pressure_offset,
+            side: self.side,
+            law: self.law,
+            ..Self::new(self.weight)
+        };
+        for (slot, &j) in self.velocities().iter().enumerate() {
+            for component in 0..C {
+                let rate = self.rates[component][slot];
+                match velocities[j] {
+                    Some(unknown) => point.add_velocity(unknown, component, rate),
+                    None => point.offset[component] += rate * u[j],
+                }
+            }
+        }
+        let (known, weights) = self.pressures();
+        for (&cell, weight) in known.iter().zip(weights) {
+            match cells[cell] {
+                Some(unknown) => point.add_pressure(unknown, *weight),
+                None => point.pressure_offset += weight * p[cell],
+            }
+        }
+        point
+    }
+
     /// Multiplies a component of the strain rate.
     pub(crate) fn scale_rate(&mut self, component: usize, factor: f64) {
         for rate in &mut self.rates[component] {

@@ -15,14 +15,16 @@
 //!   twice as long as factors, because rigid matter costs iterations. If GMRES
 //!   stalls, the factors take over.
 //!
-//! The pattern is analysed once, numerical factors are made anew for every Newton iteration, always
-//! on one thread and in one order, so the bits do not depend on the number of threads.
+//! The pattern is analysed once. Factors of earlier coefficients may go on preconditioning as long as GMRES
+//! comes to its end with them in few directions ([`SparseSystem::keep_or_factorise`]). All is done on one thread and
+//! in one order, so the bits do not depend on the number of threads.
 
 mod dissection;
 mod gmres;
 mod ldlt;
 mod lu;
 mod multigrid;
+mod pattern;
 mod substitution;
 
 use faer::sparse::SymbolicSparseColMat;
@@ -30,13 +32,19 @@ use faer::sparse::SymbolicSparseColMat;
 use crate::error::Error;
 pub use dissection::Place;
 use dissection::dissect;
-use gmres::Gmres;
+use gmres::{Gmres, Goal};
 use ldlt::QuasiDefinite;
 use lu::Lu;
 use multigrid::Multigrid;
+pub use pattern::Blocks;
 
 /// Relative residual from which on factors in single precision are enough.
 pub(crate) const LOOSE: f64 = 1e-6;
+
+/// Factors of earlier coefficients are kept as long as a solution takes no more directions than this.
+const KEPT_UNTIL: usize = 14;
+/// Directions after which a solution with factors of earlier coefficients goes on with new ones.
+const KEPT_DIRECTIONS: usize = 20;
 
 /// How systems are solved.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -57,12 +65,9 @@ pub struct Krylov {
     pub definite: usize,
     /// δ, subtracted from the diagonal of the other block where factors precondition.
     pub regularisation: f64,
-    /// Residual at which GMRES ends, relative to the right-hand side.
+    /// Least residual at which GMRES is to end, relative to the right-hand side.
     pub tolerance: f64,
 }
-
-/// Row and column of a coefficient.
-pub type Pair = [u32; 2];
 
 /// A square sparse matrix of fixed pattern with its factors.
 pub struct SparseSystem {
@@ -72,6 +77,8 @@ pub struct SparseSystem {
     iterative: Option<Iterative>,
     direct: Option<Lu>,
     state: Factors,
+    /// Whether the factors are of earlier coefficients.
+    is_kept: bool,
 }
 
 /// The iteration and its preconditioners.
@@ -115,25 +122,26 @@ impl Iterative {
 }
 
 impl SparseSystem {
-    /// Analyses the pattern given by (row, column) pairs, which may repeat. The second value maps
-    /// each pair to the place of its coefficient in [`values_mut`](Self::values_mut). Where the places of
-    /// the unknowns on a grid are known they make the analysis cheaper.
+    /// Analyses the pattern of a sum of blocks. The second value has the place of each of their coefficients in
+    /// [`values_mut`](Self::values_mut), block after block and row after row. Where the places of the unknowns on a
+    /// grid are known they make the analysis cheaper.
     ///
     /// # Errors
     /// [`Error::LinearSolver`] if the pattern cannot be analysed.
     pub fn new<const D: usize>(
         size: usize,
-        entries: Vec<Pair>,
+        blocks: Blocks,
         method: Method,
         places: Option<&[Place<D>]>,
     ) -> Result<(Self, Vec<u32>), Error> {
-        let mut pairs = entries;
-        let given = pairs.len();
+        let mut blocks = blocks;
+        let given = blocks.coefficients();
         // The preconditioner needs a diagonal everywhere.
         if method != Method::Direct {
-            pairs.extend((0..size as u32).map(|i| [i, i]));
+            (0..size).for_each(|i| blocks.push([i], [i]));
         }
-        let (pattern, mut slots) = pattern_of(size, &pairs);
+        let (pattern, mut slots) = blocks.pattern(size);
+        drop(blocks);
         let diagonal_slots = slots.split_off(given);
         let coefficients = pattern.row_idx().len();
         let mut system = Self {
@@ -143,6 +151,7 @@ impl SparseSystem {
             iterative: None,
             direct: None,
             state: Factors::None,
+            is_kept: false,
         };
         let (krylov, with_multigrid) = match method {
             Method::Direct => {
@@ -162,7 +171,7 @@ impl SparseSystem {
             )?),
         };
         let mut iterative = Iterative {
-            gmres: Gmres::new(size, krylov.tolerance),
+            gmres: Gmres::new(size),
             multigrid,
             factors: None,
             krylov,
@@ -178,8 +187,26 @@ impl SparseSystem {
 
     /// The coefficients, to be filled before [`factorise`](Self::factorise).
     pub fn values_mut(&mut self) -> &mut [f64] {
-        self.state = Factors::None;
+        if self.state == Factors::Symmetric {
+            self.is_kept = true;
+        } else {
+            self.state = Factors::None;
+        }
         &mut self.values
+    }
+
+    /// Leaves the factors of the coefficients before in use if they precondition well, and makes new ones
+    /// otherwise.
+    ///
+    /// # Errors
+    /// As [`factorise`](Self::factorise).
+    pub fn keep_or_factorise(&mut self) -> Result<(), Error> {
+        let serve = self.state == Factors::Symmetric
+            && self
+                .iterative
+                .as_ref()
+                .is_some_and(|iterative| iterative.gmres.iterations() <= KEPT_UNTIL);
+        if serve { Ok(()) } else { self.factorise() }
     }
 
     /// Makes the numerical factors of the present coefficients.
@@ -199,6 +226,7 @@ impl SparseSystem {
 
     /// The factors that precondition, or those of the whole matrix if there are none.
     fn factorise_symmetric_part(&mut self) -> Result<(), Error> {
+        self.is_kept = false;
         if let Some(iterative) = &mut self.iterative
             && let Ok(factors) = iterative.analyse(&self.pattern)
             && factors
@@ -222,7 +250,7 @@ impl SparseSystem {
     }
 
     /// GMRES with the present preconditioner; says whether it came to its end.
-    fn iterate(&mut self, right_hand_side: &[f64], solution: &mut [f64]) -> bool {
+    fn iterate(&mut self, right_hand_side: &[f64], solution: &mut [f64], goal: Goal) -> bool {
         let (pattern, values) = (&self.pattern, &self.values);
         let multiply = |x: &[f64], y: &mut [f64]| multiply(pattern, values, x, y);
         let Some(iterative) = &mut self.iterative else {
@@ -232,29 +260,46 @@ impl SparseSystem {
         match (self.state, &mut iterative.multigrid, &mut iterative.factors) {
             (Factors::Multigrid, Some(multigrid), _) => {
                 let precondition = |x: &mut [f64]| multigrid.solve(x);
-                gmres.solve(multiply, precondition, right_hand_side, solution)
+                gmres.solve(multiply, precondition, right_hand_side, solution, goal)
             }
             (Factors::Symmetric, _, Some(factors)) => {
                 let precondition = |x: &mut [f64]| factors.solve(x);
-                gmres.solve(multiply, precondition, right_hand_side, solution)
+                gmres.solve(multiply, precondition, right_hand_side, solution, goal)
             }
             _ => false,
         }
     }
 
-    /// Solves for one right-hand side.
+    /// Solves for one right-hand side, to a relative residual `tolerance` where it is solved iteratively.
     ///
     /// # Errors
     /// [`Error::LinearSolver`] if there are no factors or the solution is not finite.
-    pub fn solve(&mut self, right_hand_side: &[f64], solution: &mut [f64]) -> Result<(), Error> {
+    pub fn solve(
+        &mut self,
+        right_hand_side: &[f64],
+        solution: &mut [f64],
+        tolerance: f64,
+    ) -> Result<(), Error> {
+        let mut goal = Goal::full(tolerance);
         if self.state == Factors::Multigrid {
-            if self.iterate(right_hand_side, solution) {
+            if self.iterate(right_hand_side, solution, goal) {
                 return Ok(());
             }
             self.factorise_symmetric_part()?;
         }
+        if self.state == Factors::Symmetric && self.is_kept {
+            let short = Goal {
+                directions: KEPT_DIRECTIONS,
+                ..goal
+            };
+            if self.iterate(right_hand_side, solution, short) {
+                return Ok(());
+            }
+            goal.goes_on = solution.iter().all(|x| x.is_finite());
+            self.factorise_symmetric_part()?;
+        }
         if self.state == Factors::Symmetric {
-            if self.iterate(right_hand_side, solution) {
+            if self.iterate(right_hand_side, solution, goal) {
                 return Ok(());
             }
             self.factorise_directly()?;
@@ -294,73 +339,21 @@ fn multiply(pattern: &SymbolicSparseColMat<usize>, values: &[f64], x: &[f64], y:
     }
 }
 
-/// Compressed columns of the given (row, column) pairs, and the place of each pair among them.
-fn pattern_of(size: usize, pairs: &[Pair]) -> (SymbolicSparseColMat<usize>, Vec<u32>) {
-    // Rows and numbers of the pairs in the order of their columns, by counting.
-    let mut ends = vec![0; size + 1];
-    for &[_, column] in pairs {
-        ends[column as usize + 1] += 1;
-    }
-    for column in 0..size {
-        ends[column + 1] += ends[column];
-    }
-    let mut next = ends.clone();
-    let mut order = vec![[0_u32; 2]; pairs.len()];
-    for (e, &[row, column]) in pairs.iter().enumerate() {
-        let next = &mut next[column as usize];
-        order[*next] = [row, e as u32];
-        *next += 1;
-    }
-    let mut slots = vec![0_u32; pairs.len()];
-    let mut starts = vec![0; size + 1];
-    let mut rows: Vec<usize> = Vec::with_capacity(pairs.len() / 4);
-    // Where in the present column a row stands; the column it was last met in.
-    let mut place = vec![0_u32; size];
-    let mut met_in = vec![usize::MAX; size];
-    for column in 0..size {
-        let first = rows.len();
-        let members = &order[ends[column]..ends[column + 1]];
-        for &[row, _] in members {
-            let row = row as usize;
-            if met_in[row] != column {
-                met_in[row] = column;
-                rows.push(row);
-            }
-        }
-        rows[first..].sort_unstable();
-        for (offset, &row) in rows[first..].iter().enumerate() {
-            place[row] = (first + offset) as u32;
-        }
-        for &[row, e] in members {
-            slots[e as usize] = place[row as usize];
-        }
-        starts[column + 1] = rows.len();
-    }
-    let pattern = SymbolicSparseColMat::new_checked(size, size, starts, None, rows);
-    (pattern, slots)
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     /// [[2, 1, 1], [1, 3, g], [1, 0, 0]], with an entry given twice.
     fn saddle(method: Method, g: f64) -> SparseSystem {
-        let entries = [
-            [0, 0],
-            [0, 1],
-            [0, 2],
-            [1, 0],
-            [1, 1],
-            [2, 0],
-            [1, 1],
-            [1, 2],
-        ];
+        let mut blocks = Blocks::default();
+        blocks.push([0, 1], [0, 1]);
+        blocks.push([0], [2]);
+        blocks.push([2], [0]);
+        blocks.push([1], [1, 2]);
         let coefficients = [2.0, 1.0, 1.0, 1.0, 1.0, 1.0, 2.0, g];
         // Two faces of a cell.
         let places: [Place; 3] = [[0, 1], [2, 1], [1, 1]];
-        let (mut system, slots) =
-            SparseSystem::new(3, entries.to_vec(), method, Some(&places)).unwrap();
+        let (mut system, slots) = SparseSystem::new(3, blocks, method, Some(&places)).unwrap();
         for (slot, c) in slots.iter().zip(coefficients) {
             system.values_mut()[*slot as usize] += c;
         }
@@ -385,7 +378,9 @@ mod tests {
                 let mut system = saddle(method, g);
                 system.factorise().unwrap();
                 let mut x = [0.0; 3];
-                system.solve(&[5.0, 4.0 + 2.0 * g, 1.0], &mut x).unwrap();
+                system
+                    .solve(&[5.0, 4.0 + 2.0 * g, 1.0], &mut x, 1e-10)
+                    .unwrap();
                 for (value, expected) in x.iter().zip([1.0, 1.0, 2.0]) {
                     assert!((value - expected).abs() < tolerance, "{value} {expected}");
                 }
@@ -401,7 +396,7 @@ mod tests {
             system.values_mut().fill(0.0);
             let mut x = [0.0; 3];
             let outcome = system.factorise();
-            assert!(outcome.is_err() || system.solve(&[1.0, 2.0, 3.0], &mut x).is_err());
+            assert!(outcome.is_err() || system.solve(&[1.0, 2.0, 3.0], &mut x, 1e-10).is_err());
         }
     }
 
@@ -410,7 +405,7 @@ mod tests {
         let mut x = [0.0; 3];
         assert!(
             saddle(Method::Direct, 0.0)
-                .solve(&[1.0; 3], &mut x)
+                .solve(&[1.0; 3], &mut x, 1e-10)
                 .is_err()
         );
     }

@@ -94,8 +94,10 @@ pub struct Residuals {
 pub struct StepReport {
     /// Nonlinear iterations, failed attempts included.
     pub iterations: usize,
-    /// Linear systems factorised and solved.
+    /// Linear systems solved.
     pub linear_solves: usize,
+    /// Nonlinear iterations on parts of the unknowns, which are not among the others.
+    pub part_iterations: usize,
     /// Quadrature points whose threshold kept the pressure that the step began with, because with that of
     /// its end there is no solution.
     pub held_points: usize,

@@ -6,75 +6,127 @@ const DIRECTIONS: usize = 40;
 /// Restarts before the iteration is given up.
 const CYCLES: usize = 3;
 
+/// What a solution has to reach, and from where.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub(super) struct Goal {
+    /// Residual relative to the right-hand side.
+    pub tolerance: f64,
+    /// Most directions of the Krylov space before the iteration is given up.
+    pub directions: usize,
+    /// Whether to start from the solution as it is given, not from zero.
+    pub goes_on: bool,
+}
+
+impl Goal {
+    /// As far as the iteration gets, from zero.
+    pub(super) fn full(tolerance: f64) -> Self {
+        Self {
+            tolerance,
+            directions: DIRECTIONS * CYCLES,
+            goes_on: false,
+        }
+    }
+}
+
 /// Work arrays of the iteration for one system size.
 pub(super) struct Gmres {
     basis: Vec<Vec<f64>>,
+    /// M⁻¹ times the basis: what the solution is made from.
+    directions: Vec<Vec<f64>>,
     work: Vec<f64>,
     /// Upper triangle of the rotated Hessenberg matrix, by columns.
     triangle: Vec<Vec<f64>>,
     rotations: Vec<[f64; 2]>,
     reduced: Vec<f64>,
-    tolerance: f64,
+    iterations: usize,
 }
 
+/// Σ a b in eight strands, so that additions need not wait for each other.
 fn dot(a: &[f64], b: &[f64]) -> f64 {
-    a.iter().zip(b).map(|(a, b)| a * b).sum()
+    let mut strands = [0.0; 8];
+    let (a8, b8) = (a.chunks_exact(8), b.chunks_exact(8));
+    let rest: f64 = a8
+        .remainder()
+        .iter()
+        .zip(b8.remainder())
+        .map(|(a, b)| a * b)
+        .sum();
+    for (a, b) in a8.zip(b8) {
+        for (strand, (a, b)) in strands.iter_mut().zip(a.iter().zip(b)) {
+            *strand += a * b;
+        }
+    }
+    let [a, b, c, d, e, f, g, h] = strands;
+    ((a + b) + (c + d)) + ((e + f) + (g + h)) + rest
 }
 
 impl Gmres {
-    /// An iteration for systems of `size` unknowns that ends at a residual of `tolerance` times the
-    /// right-hand side.
-    pub(super) fn new(size: usize, tolerance: f64) -> Self {
+    /// An iteration for systems of `size` unknowns.
+    pub(super) fn new(size: usize) -> Self {
         Self {
-            tolerance,
             basis: vec![vec![0.0; size]],
+            directions: Vec::new(),
             work: vec![0.0; size],
             triangle: vec![vec![0.0; DIRECTIONS + 1]; DIRECTIONS],
             rotations: vec![[1.0, 0.0]; DIRECTIONS],
             reduced: vec![0.0; DIRECTIONS + 1],
+            iterations: 0,
         }
     }
 
-    /// Solves A x = b from x = 0; returns whether the tolerance was met.
+    /// Directions that the last solution took.
+    pub(super) fn iterations(&self) -> usize {
+        self.iterations
+    }
+
+    /// Solves A x = b; returns whether the tolerance was met.
     pub(super) fn solve(
         &mut self,
         multiply: impl Fn(&[f64], &mut [f64]),
         mut precondition: impl FnMut(&mut [f64]),
         b: &[f64],
         x: &mut [f64],
+        goal: Goal,
     ) -> bool {
-        x.fill(0.0);
-        let target = self.tolerance * dot(b, b).sqrt();
-        for _ in 0..CYCLES {
-            multiply(x, &mut self.work);
-            for ((v, b), w) in self.basis[0].iter_mut().zip(b).zip(&self.work) {
-                *v = b - w;
+        let target = goal.tolerance * dot(b, b).sqrt();
+        self.iterations = 0;
+        let mut is_zero = !goal.goes_on;
+        if is_zero {
+            x.fill(0.0);
+        }
+        loop {
+            if is_zero {
+                self.basis[0].copy_from_slice(b);
+            } else {
+                multiply(x, &mut self.work);
+                for ((v, b), w) in self.basis[0].iter_mut().zip(b).zip(&self.work) {
+                    *v = b - w;
+                }
             }
             let size = dot(&self.basis[0], &self.basis[0]).sqrt();
             // Written so that a NaN counts as failure.
             if size <= target {
                 return true;
             }
-            if !size.is_finite() {
+            let left = goal.directions - self.iterations;
+            if !size.is_finite() || left == 0 {
                 return false;
             }
             self.basis[0].iter_mut().for_each(|v| *v /= size);
             self.reduced.fill(0.0);
             self.reduced[0] = size;
             let mut used = 0;
-            while used < DIRECTIONS && self.reduced[used].abs() > 0.5 * target {
+            while used < left.min(DIRECTIONS) && self.reduced[used].abs() > 0.5 * target {
                 self.extend(used, &multiply, &mut precondition);
                 used += 1;
             }
-            self.add_combination(used, &mut precondition, x);
+            if used == 0 {
+                return false;
+            }
+            self.iterations += used;
+            self.add_combination(used, x);
+            is_zero = false;
         }
-        multiply(x, &mut self.work);
-        let miss: f64 = b
-            .iter()
-            .zip(&self.work)
-            .map(|(b, w)| (b - w) * (b - w))
-            .sum();
-        miss.sqrt() <= target
     }
 
     /// Adds one direction A M⁻¹ v, made orthogonal to the others, and rotates its column.
@@ -88,11 +140,15 @@ impl Gmres {
         if self.basis.len() == k + 1 {
             self.basis.push(vec![0.0; self.work.len()]);
         }
-        self.work.copy_from_slice(&self.basis[k]);
-        precondition(&mut self.work);
+        if self.directions.len() == k {
+            self.directions.push(vec![0.0; self.work.len()]);
+        }
+        let direction = &mut self.directions[k];
+        direction.copy_from_slice(&self.basis[k]);
+        precondition(direction);
         let (known, next) = self.basis.split_at_mut(k + 1);
         let next = &mut next[0];
-        multiply(&self.work, next);
+        multiply(direction, next);
         let column = &mut self.triangle[k];
         for (h, v) in column.iter_mut().zip(known.iter()) {
             *h = dot(next, v);
@@ -122,27 +178,17 @@ impl Gmres {
     }
 
     /// x += M⁻¹ V y with y from the triangular system.
-    fn add_combination(
-        &mut self,
-        used: usize,
-        precondition: &mut impl FnMut(&mut [f64]),
-        x: &mut [f64],
-    ) {
+    fn add_combination(&mut self, used: usize, x: &mut [f64]) {
         for k in (0..used).rev() {
             let later: f64 = (k + 1..used)
                 .map(|j| self.triangle[j][k] * self.reduced[j])
                 .sum();
             self.reduced[k] = (self.reduced[k] - later) / self.triangle[k][k];
         }
-        self.work.fill(0.0);
-        for (v, y) in self.basis[..used].iter().zip(&self.reduced) {
-            for (w, v) in self.work.iter_mut().zip(v) {
-                *w += y * v;
+        for (v, y) in self.directions[..used].iter().zip(&self.reduced) {
+            for (x, v) in x.iter_mut().zip(v) {
+                *x += y * v;
             }
-        }
-        precondition(&mut self.work);
-        for (x, w) in x.iter_mut().zip(&self.work) {
-            *x += w;
         }
     }
 }
@@ -161,7 +207,7 @@ mod tests {
         };
         let mut x = [0.0; 3];
         let mut calls = 0;
-        let solved = Gmres::new(3, 1e-10).solve(
+        let solved = Gmres::new(3).solve(
             multiply,
             |x: &mut [f64]| {
                 calls += 1;
@@ -169,6 +215,7 @@ mod tests {
             },
             &[6.0, 6.5, 19.0],
             &mut x,
+            Goal::full(1e-10),
         );
         assert!(solved && calls <= 4);
         for (x, expected) in x.iter().zip([1.0, 2.0, 3.0]) {

@@ -250,8 +250,8 @@ impl Coarsest {
 
 #[cfg(test)]
 mod tests {
-    use super::super::gmres::Gmres;
-    use super::super::pattern_of;
+    use super::super::gmres::{Gmres, Goal};
+    use super::super::pattern::Blocks;
     use super::*;
 
     /// Creeping flow in a box of n × n cells that is open on the right, with a disc `contrast` times as viscous:
@@ -317,9 +317,12 @@ mod tests {
             }
         }
         let size = places.len();
-        let mut pairs: Vec<[u32; 2]> = entries.iter().map(|(pair, _)| *pair).collect();
-        pairs.extend((0..size as u32).map(|i| [i, i]));
-        let (pattern, slots) = pattern_of(size, &pairs);
+        let mut blocks = Blocks::default();
+        for &([row, column], _) in &entries {
+            blocks.push([row as usize], [column as usize]);
+        }
+        (0..size).for_each(|i| blocks.push([i], [i]));
+        let (pattern, slots) = blocks.pattern(size);
         let mut values = vec![0.0; pattern.row_idx().len()];
         for (slot, (_, value)) in slots.iter().zip(&entries) {
             values[*slot as usize] += value;
@@ -350,8 +353,14 @@ mod tests {
                 multigrid.solve(x);
             }
         };
-        let mut gmres = Gmres::new(places.len(), 1e-6);
-        let solved = gmres.solve(multiply, precondition, &right_hand_side, &mut x);
+        let mut gmres = Gmres::new(places.len());
+        let solved = gmres.solve(
+            multiply,
+            precondition,
+            &right_hand_side,
+            &mut x,
+            Goal::full(1e-6),
+        );
         solved.then_some(count)
     }
 

@@ -5,11 +5,11 @@
 use crate::discretisation::Discretisation;
 use crate::error::Error;
 use crate::grid::Axis;
-use crate::linear_solver::{Krylov, LOOSE, Method, SparseSystem};
+use crate::linear_solver::{Blocks, Krylov, LOOSE, Method, SparseSystem};
 use crate::yield_step::LinearSolver;
 
-/// Most coefficients that a quadrature point adds, and a few for the divergence.
-const MOST_PAIRS: usize = 64;
+/// Velocities of a quadrature point in a plane, to set room aside for.
+const MOST_ROWS: usize = 6;
 
 /// The matrix of a step with the places of its coefficients.
 pub(super) struct StepMatrix {
@@ -33,25 +33,26 @@ impl StepMatrix {
     ) -> Result<Self, Error> {
         let velocities = discretisation.velocities();
         let size = velocities + discretisation.cells();
-        let mut entries = Vec::with_capacity(size + MOST_PAIRS * discretisation.points().len());
-        let pair = |row: usize, column: usize| [row as u32, column as u32];
-        entries.extend((0..velocities).map(|j| pair(j, j)));
+        let points = discretisation.points();
+        let mut blocks = Blocks::with_capacity(
+            size + 2 * discretisation.divergence().len() + points.len(),
+            size + 2 * discretisation.divergence().len() + MOST_ROWS * points.len(),
+        );
+        (0..velocities).for_each(|j| blocks.push([j], [j]));
         for &(cell, j, _) in discretisation.divergence() {
-            entries.push(pair(j, velocities + cell));
-            entries.push(pair(velocities + cell, j));
+            blocks.push([j], [velocities + cell]);
+            blocks.push([velocities + cell], [j]);
         }
-        for point in discretisation.points() {
-            for &row in point.velocities() {
-                entries.extend(point.velocities().iter().map(|&column| pair(row, column)));
-                let cells = point.pressures().0;
-                entries.extend(cells.iter().map(|&cell| pair(row, velocities + cell)));
-            }
+        for point in points {
+            let rows = point.velocities().iter().copied();
+            let cells = point.pressures().0.iter().map(|cell| velocities + cell);
+            blocks.push(rows.clone(), rows.chain(cells));
         }
-        entries.extend((velocities..size).map(|i| pair(i, i)));
-        let given = entries.len();
+        let given = blocks.coefficients();
+        (velocities..size).for_each(|i| blocks.push([i], [i]));
         let method = method_for(discretisation, tolerance, solver);
-        let (system, slots) = SparseSystem::new(size, entries, method, discretisation.places())?;
-        let (slots, diagonal) = slots.split_at(given - discretisation.cells());
+        let (system, slots) = SparseSystem::new(size, blocks, method, discretisation.places())?;
+        let (slots, diagonal) = slots.split_at(given);
         let (mass, rest) = slots.split_at(velocities);
         let (divergence, points) = rest.split_at(2 * discretisation.divergence().len());
         Ok(Self {

@@ -13,6 +13,8 @@
 //! their pressure keep the pressure that the step began with: friction is then given, and the step has a
 //! solution. [`StepReport::held_points`] counts them.
 
+mod part;
+
 use serde::{Deserialize, Serialize};
 
 use super::coefficients::StepMatrix;
@@ -102,6 +104,11 @@ const WARM_ITERATIONS: usize = 20;
 /// iteratively: a tighter one saves no iteration.
 const NEWTON_TOLERANCE: f64 = 1e-3;
 
+/// Residual of a linear system, as a part of what the nonlinear ones may be over what they are.
+const FORCING: f64 = 0.3;
+/// Loosest residual of a linear system over [`PrimalDualOptions::linear_tolerance`].
+const LOOSEST: f64 = 50.0;
+
 /// The law linearised at one quadrature point.
 #[derive(Debug, Clone, Copy)]
 struct LinearisedPoint<const C: usize> {
@@ -129,6 +136,8 @@ struct Strategy {
     factor: f64,
     max_iterations: usize,
     line_search: bool,
+    /// Whether what is left in few places is solved there by itself.
+    solves_parts: bool,
 }
 
 /// The default solver of time steps. It holds the matrix and the work arrays of one grid.
@@ -146,6 +155,8 @@ pub struct PrimalDual<const C: usize = COMPONENTS> {
     change: Vec<f64>,
     candidate: Vec<f64>,
     candidate_pressure: Vec<f64>,
+    /// Residual of the stress law at each point.
+    misses: Vec<f64>,
 }
 
 impl<const C: usize> PrimalDual<C> {
@@ -197,45 +208,70 @@ impl<const C: usize> PrimalDual<C> {
             change: vec![0.0; velocities + cells],
             candidate: vec![0.0; velocities],
             candidate_pressure: vec![0.0; cells],
+            misses: vec![0.0; discretisation.points().len()],
         })
     }
 
-    /// One run of Newton's method on `self.trial`, which starts as a copy of `start`.
+    /// One run of Newton's method on `self.trial`, which starts as a copy of `start`; it ends at the residuals
+    /// given, or those that the speed allows.
     fn attempt<R: Rheology, const D: usize, const V: usize>(
         &mut self,
         problem: &StepProblem<'_, R, D, C, V>,
+        u_old: &[f64],
         start: &FlowState<C>,
         strategy: &Strategy,
+        given: Option<&Residuals>,
         report: &mut StepReport,
     ) {
         self.trial.clone_from(start);
         self.conflicts.begin();
         self.cut.fill(false);
         let mut floor = strategy.first_floor;
+        // In space mirrored flows are to stay alike, to which loose systems and choices do not contribute.
+        let keeps = D == 2;
+        let mut solves_parts = strategy.solves_parts
+            && keeps
+            && problem.discretisation.places().is_some()
+            && self.conflicts.held() == 0;
+        // Floor with which the factors were made. Those of an earlier step would not be there after a restart.
+        let mut floor_of_factors = f64::NAN;
+        let mut tolerance = self.options.linear_tolerance;
         for iteration in 0..strategy.max_iterations {
             self.release(problem.discretisation, iteration == 0);
             self.linearise(problem, floor);
-            self.assemble(problem, &start.u);
+            self.assemble(problem, u_old);
             report.iterations += 1;
             report.linear_solves += 1;
-            let solved = self.matrix.system.factorise().and_then(|()| {
-                self.matrix
-                    .system
-                    .solve(&self.right_hand_side, &mut self.change)
-            });
+            let system = &mut self.matrix.system;
+            let prepared = if keeps && floor == floor_of_factors {
+                system.keep_or_factorise()
+            } else {
+                system.factorise()
+            };
+            floor_of_factors = floor;
+            let solved = prepared
+                .and_then(|()| system.solve(&self.right_hand_side, &mut self.change, tolerance));
             if solved.is_err() {
                 return;
             }
             let fraction = if strategy.line_search {
-                self.line_search(problem, &start.u, floor)
+                self.line_search(problem, u_old, floor)
             } else {
                 1.0
             };
             self.update(problem, floor, fraction);
-            report.residuals = self.residuals(problem, &start.u, floor);
-            if floor <= self.options.strain_rate_floor
-                && self.is_converged(problem, &report.residuals)
-            {
+            report.residuals = self.residuals(problem, u_old, floor);
+            let is_last_floor = floor <= self.options.strain_rate_floor;
+            let mut allowed = given.copied().unwrap_or_else(|| self.tolerances(problem));
+            if is_last_floor && solves_parts && !report.residuals.are_within(&allowed) {
+                solves_parts = self.solve_part(problem, u_old, &allowed, report);
+                report.residuals = self.residuals(problem, u_old, floor);
+                allowed = given.copied().unwrap_or_else(|| self.tolerances(problem));
+            }
+            if keeps {
+                tolerance = self.forcing(&allowed, &report.residuals);
+            }
+            if is_last_floor && report.residuals.are_within(&allowed) {
                 report.converged = true;
                 return;
             }
@@ -246,6 +282,14 @@ impl<const C: usize> PrimalDual<C> {
                 floor = (floor * strategy.factor).max(self.options.strain_rate_floor);
             }
         }
+    }
+
+    /// Relative residual to which the next linear system is solved: a part of what is left of the way, by which the
+    /// iteration loses nothing (Eisenstat & Walker, *SIAM J. Sci. Comput.* 17 (1996) 16).
+    fn forcing(&self, allowed: &Residuals, found: &Residuals) -> f64 {
+        let left = (allowed.momentum / found.momentum).min(allowed.stress / found.stress);
+        let least = self.options.linear_tolerance;
+        (FORCING * left).max(least).min(LOOSEST * least)
     }
 
     /// ∂s/∂γ = κ/γ_ε 1 + (κ_γ γ − s) ⊗ γ/γ_ε² and ∂s/∂p = κ_p γ/γ_ε, with γ_ε = √(|γ|² + ε²).
@@ -435,13 +479,14 @@ impl<const C: usize> PrimalDual<C> {
         let momentum = &mut self.right_hand_side[..self.trial.u.len()];
         let mut stress = 0.0;
         let points = problem.discretisation.points().iter().zip(&self.trial.s);
-        for (q, (point, s)) in points.enumerate() {
+        for (q, ((point, s), kept)) in points.zip(&mut self.misses).enumerate() {
             let pressure = self.conflicts.pressure(q, point, &self.trial.p);
             let (gamma, rate, threshold) =
                 evaluate(problem.rheology, point, &self.trial.u, pressure, floor);
             let miss: [f64; C] = std::array::from_fn(|a| s[a] * rate - threshold.stress * gamma[a]);
             let scale = rate * (threshold.stress + 1e-3);
-            stress = largest_or_nan(stress, strain_rate_norm(miss) / scale);
+            *kept = strain_rate_norm(miss) / scale;
+            stress = largest_or_nan(stress, *kept);
         }
         Residuals {
             momentum: momentum_residual(problem, u_old, &self.trial, momentum),
@@ -472,11 +517,11 @@ impl<const C: usize> PrimalDual<C> {
             })
     }
 
-    fn is_converged<R, const D: usize, const V: usize>(
+    /// What the residuals of a step may be, by how fast it moves.
+    fn tolerances<R, const D: usize, const V: usize>(
         &self,
         problem: &StepProblem<'_, R, D, C, V>,
-        residuals: &Residuals,
-    ) -> bool {
+    ) -> Residuals {
         let axes = problem.discretisation.grid().axes();
         let spacing = axes
             .iter()
@@ -487,10 +532,21 @@ impl<const C: usize> PrimalDual<C> {
         let round_off = 10.0 * f64::EPSILON * speed / spacing;
         let options = &self.options;
         let motion = (options.tolerance_in_motion * speed.min(1.0)).max(1.0);
-        residuals.momentum <= motion * options.momentum_tolerance
-            && residuals.divergence <= options.divergence_tolerance.max(round_off)
-            && residuals.stress
-                <= (motion * options.stress_tolerance).max(round_off / options.strain_rate_floor)
+        Residuals {
+            momentum: motion * options.momentum_tolerance,
+            divergence: options.divergence_tolerance.max(round_off),
+            stress: (motion * options.stress_tolerance).max(round_off / options.strain_rate_floor),
+            strain_rate_floor: options.strain_rate_floor,
+        }
+    }
+}
+
+impl Residuals {
+    /// Whether none is larger than allowed.
+    fn are_within(&self, allowed: &Self) -> bool {
+        self.momentum <= allowed.momentum
+            && self.divergence <= allowed.divergence
+            && self.stress <= allowed.stress
     }
 }
 
@@ -562,18 +618,21 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> YieldSolver<R,
                 factor: options.floor_factor,
                 max_iterations: WARM_ITERATIONS,
                 line_search: false,
+                solves_parts: true,
             },
             Strategy {
                 first_floor: options.first_strain_rate_floor,
                 factor: options.floor_factor,
                 max_iterations: options.max_iterations,
                 line_search: false,
+                solves_parts: false,
             },
             Strategy {
                 first_floor: (1.0_f64).max(options.first_strain_rate_floor),
                 factor: options.floor_factor.sqrt(),
                 max_iterations: 2 * options.max_iterations,
                 line_search: true,
+                solves_parts: false,
             },
         ];
         // Without stress there is nothing warm to start from, unless the material has none.
@@ -583,7 +642,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> YieldSolver<R,
         self.conflicts.forget();
         for round in 0..=MOST_HELD_ROUNDS {
             for strategy in &strategies[usize::from(is_cold)..] {
-                self.attempt(problem, state, strategy, &mut report);
+                self.attempt(problem, &state.u, state, strategy, None, &mut report);
                 if report.converged {
                     state.clone_from(&self.trial);
                     report.held_points = self.conflicts.held();

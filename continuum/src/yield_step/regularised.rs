@@ -155,7 +155,7 @@ impl<R: Rheology> YieldSolver<R> for RegularisedViscosity {
             let solved = self.matrix.system.factorise().and_then(|()| {
                 self.matrix
                     .system
-                    .solve(&self.right_hand_side, &mut self.change)
+                    .solve(&self.right_hand_side, &mut self.change, LINEAR_TOLERANCE)
             });
             if solved.is_err() {
                 return Ok(report);
