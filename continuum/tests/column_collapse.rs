@@ -76,10 +76,10 @@ fn wide_column_collapses_and_comes_to_rest() {
 /// inside a cell the sliver there comes down. With less it falls.
 #[test]
 fn friction_above_one_holds_a_column_up() {
-    for (cells, largest) in [(96, 0.02), (192, 1e-6)] {
+    for (aspect, cells, largest) in [(2.0, 96, 0.02), (2.0, 192, 1e-6), (6.0, 192, 0.02)] {
         let standing = CollapseCase {
             rheology: MuI::new(2.0, 2.28, 0.4, 1.0 / 65.0, 1.0, 1.0),
-            ..case(2.0, cells, 1.0 / 65.0)
+            ..case(aspect, cells, 1.0 / 65.0)
         };
         let options = SurfaceOptions::default();
         let before = Collapse::new(&standing, &options).unwrap();

@@ -37,8 +37,25 @@ impl<R: Rheology> SurfaceFlow<R> {
         let mut flow = Self::filling(grid, fractions, rheology, acceleration, options)?;
         flow.set_weight_for_pressure();
         flow.take_weight_from_what_hangs();
+        flow.stand_upright();
         flow.saved.clone_from(&flow.state);
         Ok(flow)
+    }
+
+    /// Where friction lets columns bear their weight with no stress across them, they begin so: σ_zz = −2 p = −w,
+    /// |τ| = p. Where walls or other
+    /// matter lean on them the first step finds what holds there.
+    fn stand_upright(&mut self) {
+        let floor = self.options.solver.strain_rate_floor;
+        for (cell, weight) in self.state.pressure.iter_mut().enumerate() {
+            let p = 0.5 * *weight;
+            if p > 0.0 && self.rheology.threshold(floor, p).stress > p {
+                *weight = p;
+                for stress in &mut self.state.stress[cell * POINTS..][..POINTS] {
+                    *stress = [p, 0.0];
+                }
+            }
+        }
     }
 
     /// The same flow with open ends along x: this flows in at the low one, and what comes to the high one flows
