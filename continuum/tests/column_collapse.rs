@@ -72,6 +72,29 @@ fn wide_column_collapses_and_comes_to_rest() {
     assert!(collapse.front(0.01).height > 0.995);
 }
 
+/// With friction above one a column bears its own weight, σ_xx = 0 and |τ| = p < μ_s p, and stands; where its face ends
+/// inside a cell the sliver there comes down. With less it falls.
+#[test]
+fn friction_above_one_holds_a_column_up() {
+    for (aspect, cells, largest) in [(2.0, 96, 0.02), (2.0, 192, 1e-6), (6.0, 192, 0.02)] {
+        let standing = CollapseCase {
+            rheology: MuI::new(2.0, 2.28, 0.4, 1.0 / 65.0, 1.0, 1.0),
+            ..case(aspect, cells, 1.0 / 65.0)
+        };
+        let options = SurfaceOptions::default();
+        let before = Collapse::new(&standing, &options).unwrap();
+        let (after, at_rest) = run(&standing, &options, 4.0);
+        let change = profile_difference(&before, &after);
+        println!("{cells} cells: the profile changes by {change:.2e} of the area");
+        assert!(at_rest && change < largest, "{at_rest} {change}");
+    }
+    let falling = case(2.0, 96, 1.0 / 65.0);
+    let options = SurfaceOptions::default();
+    let before = Collapse::new(&falling, &options).unwrap();
+    let (after, _) = run(&falling, &options, 1.0);
+    assert!(profile_difference(&before, &after) > 0.2);
+}
+
 #[test]
 fn restart_gives_the_same_bits() {
     let case = wide(32);

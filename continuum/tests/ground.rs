@@ -371,7 +371,7 @@ fn level_ground_is_a_level_floor() {
     let (_, depth) = ground.profile();
     let miss: f64 = exact.iter().zip(&depth).map(|(a, b)| (a - b).abs()).sum();
     let miss = miss / exact.iter().sum::<f64>();
-    assert!(miss < 2e-3, "{miss:e}");
+    assert!(miss < 3e-3, "{miss:e}");
 }
 
 /// Down a slope of 0.4 farther than on the level.

@@ -20,7 +20,9 @@ use crate::yield_step::FlowState;
 const FULL_TO: f64 = 1e-11;
 
 impl<R: Rheology> SurfaceFlow<R> {
-    /// Material at rest that fills the given fraction of each cell of a plane grid, x fastest.
+    /// Material at rest that fills the given fraction of each cell of a plane grid, x fastest. What stands on the
+    /// floor begins under its own weight: with friction above one a free face both stands and falls, as two solutions of
+    /// the same equations, and without pressure to begin with it would fall.
     ///
     /// # Errors
     /// Settings out of range.
@@ -31,7 +33,28 @@ impl<R: Rheology> SurfaceFlow<R> {
         acceleration: [f64; DIMENSIONS],
         options: SurfaceOptions,
     ) -> Result<Self, Error> {
-        Self::filling(grid, fractions, rheology, acceleration, options)
+        let mut flow = Self::filling(grid, fractions, rheology, acceleration, options)?;
+        flow.set_weight_for_pressure();
+        flow.take_weight_from_what_hangs();
+        flow.stand_upright();
+        flow.saved.clone_from(&flow.state);
+        Ok(flow)
+    }
+
+    /// Where friction lets columns bear their weight with no stress across them, they begin so: σ_zz = −2 p = −w,
+    /// |τ| = p. Where walls or other
+    /// matter lean on them the first step finds what holds there.
+    fn stand_upright(&mut self) {
+        let floor = self.options.solver.strain_rate_floor;
+        for (cell, weight) in self.state.pressure.iter_mut().enumerate() {
+            let p = 0.5 * *weight;
+            if p > 0.0 && self.rheology.threshold(floor, p).stress > p {
+                *weight = p;
+                for stress in &mut self.state.stress[cell * POINTS..][..POINTS] {
+                    *stress = [p, 0.0];
+                }
+            }
+        }
     }
 
     /// The same flow with open ends along x: this flows in at the low one, and what comes to the high one flows
@@ -218,6 +241,19 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                     _ => 0.0,
                 };
                 self.state.pressure[cell] = load + 0.5 * per_cell * fractions[cell];
+            }
+        }
+    }
+
+    /// Takes the pressure from cells that do not stand on others down to the lower edge of the grid.
+    fn take_weight_from_what_hangs(&mut self) {
+        let axis = D - 1;
+        let mut stands = vec![false; self.topology.cells()];
+        for cell in 0..stands.len() {
+            let below = self.topology.cell_neighbours[cell][axis][0];
+            stands[cell] = self.state.fractions[cell] > 0.0 && (below == NONE || stands[below]);
+            if !stands[cell] {
+                self.state.pressure[cell] = INACTIVE;
             }
         }
     }
