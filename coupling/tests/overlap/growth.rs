@@ -2,7 +2,7 @@
 
 use colluvium_continuum::free_surface::SurfaceOptions;
 use colluvium_continuum::rheology::MuI;
-use colluvium_coupling::overlap::bowl::{Bowl, BowlSpec, Growth};
+use colluvium_coupling::overlap::bowl::{Bowl, BowlSpec, Growth, Reason};
 use colluvium_coupling::overlap::material_edge::Travel;
 use colluvium_coupling::overlap::{OverlapSettings, Scales};
 use colluvium_dem::preparation::*;
@@ -416,4 +416,50 @@ fn a_box_that_has_grown_goes_on_from_its_numbers_and_within_its_budget() {
         (1.0, 0)
     );
     assert!(kept.simulation.grain_count() as f64 <= most);
+}
+
+/// Grains are thrown up in the middle of a bed at rest: both sides, where nothing moves, come nearer; then those beside a
+/// side are thrown, and it goes out again.
+#[test]
+fn sides_move_by_what_the_grains_beside_them_do() {
+    let mut bed = Bed::with(Travel {
+        rest: 0.1,
+        wake: 0.3,
+        hold: 0.3,
+        ..TRAVEL
+    });
+    let reasons = |bed: &Bed| -> Vec<(usize, Reason)> {
+        bed.bowl
+            .moves()
+            .iter()
+            .map(|m| (m.side, m.reason))
+            .collect()
+    };
+    bed.advance(6.0, 0.8);
+    let calm = reasons(&bed);
+    let throw = |bed: &mut Bed, range: std::ops::Range<f64>| {
+        let before = bed.bowl.grain_momentum(&mut bed.simulation);
+        bed.simulation.give_velocity(|g| {
+            match range.contains(&g.position.x) && g.position.z > 6.0 {
+                true => 2.0 * Vector3::z(),
+                false => g.velocity,
+            }
+        });
+        bed.damped += bed.bowl.grain_momentum(&mut bed.simulation) - before;
+    };
+    throw(&mut bed, 12.2..13.8);
+    bed.advance(1.5, 1.0);
+    let rested = reasons(&bed);
+    let face = bed.face();
+    throw(&mut bed, face - 4.0..face);
+    bed.advance(0.6, 1.0);
+    let woken = reasons(&bed);
+    println!("{calm:?}\n{rested:?}\n{woken:?}\n{:?}", bed.books());
+    assert!(calm.is_empty());
+    assert!(rested.contains(&(RIGHT, Reason::Rest)) && rested.contains(&(0, Reason::Rest)));
+    assert!(woken[rested.len()..].contains(&(RIGHT, Reason::Speed)));
+    let books = bed.books();
+    assert!(
+        books[0].abs() < 0.02 && books[1].abs() < 1e-12 && books[2] < 1e-12 && books[3] < 1e-12
+    );
 }
