@@ -32,6 +32,75 @@ impl Patch {
         free.map(Grain::mass).sum()
     }
 
+    /// Takes those grains out for which `f` says so by their numbers and themselves. Histories of contacts between both parts stay with both: each is
+    /// given to its contact where the second grain of it is put back.
+    pub fn split(&mut self, mut f: impl FnMut(u32, &Grain) -> bool) -> Patch {
+        let rows = self.ids.iter().zip(&self.grains);
+        let goes: Vec<bool> = rows.map(|(id, grain)| f(*id, grain)).collect();
+        let part = |wanted: bool| {
+            let rows = self.grains.iter().zip(&self.ids).zip(&goes);
+            let rows = rows
+                .filter(|(_, goes)| **goes == wanted)
+                .map(|(row, _)| row);
+            let (grains, ids) = rows.map(|(grain, id)| (*grain, *id)).unzip();
+            let mut patch = Patch {
+                grains,
+                ids,
+                ..Patch::default()
+            };
+            let width = self.width();
+            for (k, pair) in self.pairs.iter().enumerate() {
+                if pair.iter().any(|id| patch.ids.binary_search(id).is_ok()) {
+                    patch.pairs.push(*pair);
+                    let row = k * width..(k + 1) * width;
+                    patch.histories.extend_from_slice(&self.histories[row]);
+                }
+            }
+            patch
+        };
+        let (taken, rest) = (part(true), part(false));
+        *self = rest;
+        taken
+    }
+
+    /// Takes another patch's grains in, none of which it has.
+    pub fn merge(&mut self, other: &Patch) {
+        let width = self.width().max(other.width());
+        let mut rows: Vec<(u32, Grain)> = Vec::new();
+        let mut contacts: Vec<([u32; 2], &[f64])> = Vec::new();
+        for patch in [&*self, other] {
+            rows.extend(patch.ids.iter().copied().zip(patch.grains.iter().copied()));
+            let row = |k: usize| &patch.histories[k * width..(k + 1) * width];
+            contacts.extend(patch.pairs.iter().enumerate().map(|(k, p)| (*p, row(k))));
+        }
+        rows.sort_unstable_by_key(|(id, _)| *id);
+        let ends = |pair: &[u32; 2]| (pair[0].min(pair[1]), pair[0].max(pair[1]));
+        contacts.sort_by_key(|(pair, _)| ends(pair));
+        // Of a contact between both either may know; what the other says is later.
+        contacts.dedup_by(|later, former| {
+            let same = ends(&later.0) == ends(&former.0);
+            if same {
+                *former = *later;
+            }
+            same
+        });
+        let merged = Patch {
+            ids: rows.iter().map(|(id, _)| *id).collect(),
+            grains: rows.into_iter().map(|(_, grain)| grain).collect(),
+            pairs: contacts.iter().map(|(pair, _)| *pair).collect(),
+            histories: contacts.iter().flat_map(|(_, row)| row.to_vec()).collect(),
+        };
+        *self = merged;
+    }
+
+    /// Numbers of a history.
+    fn width(&self) -> usize {
+        self.histories
+            .len()
+            .checked_div(self.pairs.len())
+            .unwrap_or(0)
+    }
+
     /// All of it as numbers, for a checkpoint of whoever holds it.
     pub fn numbers(&self) -> Vec<f64> {
         let mut row = vec![self.grains.len() as f64, self.pairs.len() as f64];

@@ -120,3 +120,38 @@ fn a_patch_of_another_run_is_refused() {
     assert!(simulation.put_back(&patch).is_err());
     assert!(Patch::of(&patch.numbers()[..20]).is_none());
 }
+
+/// Split by numbers and merged again a patch is what it was; one part put back after the other, the springs between them
+/// come with the second.
+#[test]
+fn a_patch_may_be_put_back_in_parts() {
+    let (name, law) = laws()[1];
+    let [mut whole, mut other] = pair(law);
+    let patch = other.take_out(taken);
+    let mut second = patch.clone();
+    let first = second.split(|id, _| id % 3 == 0);
+    assert!(
+        first.grains.len() > 20 && second.grains.len() > 20,
+        "{name}"
+    );
+    let both = first
+        .pairs
+        .iter()
+        .filter(|pair| second.pairs.contains(pair));
+    assert!(both.count() > 10);
+    other.put_back(&first).unwrap();
+    other.put_back(&second).unwrap();
+    whole.advance(40).unwrap();
+    other.advance(40).unwrap();
+    let [x, v, spin] = apart(&mut whole, &mut other);
+    assert!(
+        x < 1e-13 && v < 1e-10 && spin < 1e-8,
+        "{x:e} {v:e} {spin:e}"
+    );
+    let mut merged = second;
+    merged.split(|id, _| first.ids.contains(&id));
+    merged.merge(&first);
+    assert_eq!((&merged.grains, &merged.ids), (&patch.grains, &patch.ids));
+    assert_eq!(merged.pairs.len(), patch.pairs.len());
+    assert_eq!(merged.histories.len(), patch.histories.len());
+}

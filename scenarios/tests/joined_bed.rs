@@ -113,13 +113,19 @@ fn a_ball_sinks_into_a_joined_bed_as_into_grains() {
     assert!(value(&joint, "grain_steps_share") < 0.4);
 }
 
-/// Killed twice on the way, it goes on to the same bits.
+/// A box that grows.
+const MOVING: [&str; 2] = ["zones.moving=true", "zones.near_diameters=1.5"];
+
+/// Killed twice on the way, its box growing, it goes on to the same bits, with another number of threads.
 #[test]
 fn a_joined_bed_goes_on_after_a_kill() {
     let folder = tempfile::tempdir().unwrap();
-    succeed(folder.path(), &joined("whole", &[]));
-    let mut killed = joined("killed", &[]);
-    killed.extend(["--checkpoint-every", "0"]);
+    let mut whole = joined("whole", &MOVING);
+    whole.extend(["--threads", "2"]);
+    succeed(folder.path(), &whole);
+    assert!(value(&summary(&folder.path().join("whole")), "moves") >= 3.0);
+    let mut killed = joined("killed", &MOVING);
+    killed.extend(["--checkpoint-every", "0", "--threads", "1"]);
     let checkpoint = folder.path().join("killed/checkpoint.h5");
     for _ in 0..2 {
         let mut child = Command::new(env!("CARGO_BIN_EXE_colluvium"))
@@ -138,27 +144,60 @@ fn a_joined_bed_goes_on_after_a_kill() {
             killed.push("--resume");
         }
     }
-    let mut last = joined("killed", &[]);
+    let mut last = joined("killed", &MOVING);
     last.push("--resume");
     succeed(folder.path(), &last);
     let [whole, resumed] = ["whole", "killed"].map(|name| hash(&folder.path().join(name)));
     assert_eq!(whole, resumed);
 }
 
-/// Where a side of the box lies in the ball's way, the run ends when the ball comes to it, and says so.
+/// Where a side of the box lies in the ball's way, the run ends when the ball comes to it, and says so; a box that grows
+/// lets it go on as in grains alone, but not beyond its budget.
 #[test]
-fn a_ball_that_comes_to_the_overlap_ends_the_run() {
+fn a_ball_that_comes_to_the_overlap_ends_the_run_or_lets_the_box_grow() {
     let folder = tempfile::tempdir().unwrap();
-    succeed(
-        folder.path(),
-        &joined("fast", &["speed=8", "ball.density=20000"]),
+    let at = |name: &str| folder.path().join(name);
+    let fast = ["speed=4", "duration=0.012"];
+    succeed(folder.path(), &arguments("grains", &fast));
+    succeed(folder.path(), &joined("fixed", &fast));
+    for (name, more) in [("grown", &[][..]), ("short", &["zones.budget=1400"])] {
+        let sets = [&fast[..], &MOVING, more].concat();
+        succeed(folder.path(), &joined(name, &sets));
+    }
+    let [fixed, grown, short] = ["fixed", "grown", "short"].map(|name| summary(&at(name)));
+    for (found, key) in [(&fixed, "zones.depth"), (&short, "zones.budget")] {
+        assert!(value(found, "overlap_clearance") <= 0.0);
+        let remarks = found["remarks"].to_string();
+        assert!(remarks.contains(key), "{remarks}");
+    }
+    let end = |name: &str| table(&at(name).join("ball.csv")).1.last().unwrap()[0];
+    assert!(end("fixed") < end("grown") && end("short") < end("grown"));
+    assert!(
+        value(&short, "refused_moves") > 0.0 && short["model"]["grains"].as_f64() < Some(1401.0)
     );
-    let found = summary(&folder.path().join("fast"));
-    assert!(value(&found, "overlap_clearance") <= 0.0);
-    let (_, rows) = table(&folder.path().join("fast/ball.csv"));
-    assert!(rows.last().unwrap()[0] < 0.01, "{:?}", rows.last());
-    let remarks = found["remarks"].to_string();
-    assert!(remarks.contains("zones.depth"), "{remarks}");
+    let away = apart(folder.path(), ["grains", "grown"]);
+    for name in [
+        "moves",
+        "displaced",
+        "grain_steps_share",
+        "handshake_mass",
+        "ledger_grains",
+        "ledger_exchange",
+    ] {
+        println!("{name}: {:.3e}", value(&grown, name));
+    }
+    println!("ways of the ball apart {away:.4}");
+    assert!(
+        value(&grown, "overlap_clearance") > 0.001 && away < 0.1,
+        "{away}"
+    );
+    assert!(value(&grown, "moves") >= 2.0 && value(&grown, "grain_steps_share") < 0.8);
+    assert!(value(&grown, "handshake_mass").abs() < 0.03);
+    assert!(value(&grown, "ledger_grains") < 1e-10 && value(&grown, "ledger_exchange") < 1e-10);
+    assert!(grown["ledger"]["mass_relative"].as_f64().unwrap().abs() < 1e-12);
+    let (names, rows) = table(&at("grown").join("moves.csv"));
+    assert_eq!(names[..4], ["t", "side", "place", "reason"]);
+    assert_eq!(rows.len() as f64, value(&grown, "moves"));
 }
 
 #[test]
@@ -168,6 +207,12 @@ fn bad_joined_beds_are_refused_by_key() {
         (&["zones.half_width=0.009"][..], "zones.half_width", "above"),
         (&["zones.half_width=0.02"], "zones.half_width", "below"),
         (&["zones.depth=0.005"], "zones.depth", "above"),
+        (&["zones.budget=100"], "zones.budget", "zones.moving = true"),
+        (
+            &["zones.moving=true", "zones.wake_speed_scaled=0.0001"],
+            "zones.wake_speed_scaled",
+            "above zones.rest_speed_scaled",
+        ),
         (
             &["zones.cell_diameters=3"],
             "zones.cell_diameters",

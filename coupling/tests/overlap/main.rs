@@ -6,6 +6,7 @@
 
 mod books;
 mod comparison;
+mod growth;
 mod hard_cases;
 mod incline;
 mod joined;

@@ -2,6 +2,7 @@
 
 mod bed_file;
 pub mod joined;
+mod moves;
 
 use super::world::workshop::{Surroundings, softened, step_for};
 use super::world::{Expected, Ran, Recipe, Workshop, World};

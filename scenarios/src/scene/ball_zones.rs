@@ -3,8 +3,10 @@
 use super::SceneError;
 use super::ball_impact::{BallImpactScene, BallModel};
 use super::collapse_grains::CalibratedKind;
-use super::collapse_zones::DENSE;
+use super::collapse_zones::{DENSE, FEWEST_GRAINS};
 use super::world::{Materials, Place};
+use colluvium_coupling::overlap::bowl::Growth;
+use colluvium_coupling::overlap::material_edge::Travel;
 use colluvium_coupling::overlap::{Resolved, Scales};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -34,6 +36,44 @@ pub struct BallZoneKeys {
     #[serde(default = "three")]
     #[schemars(extend("minimum" = 0.5, "maximum" = 100.0))]
     pub cell_diameters: f64,
+    /// The box grows where the ball comes near its overlap or grains beside it are fast, and shrinks where nothing moves.
+    #[serde(default)]
+    pub moving: bool,
+    /// Distance between the ball and the inner end of the overlap below which a side of a moving box goes outwards, in
+    /// diameters of the grains.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
+    pub near_diameters: Option<f64>,
+    /// Rms speed of the grains beside the overlap, over that of the ball at the start, above which a side of a moving box goes
+    /// outwards; above rest_speed_scaled.
+    #[serde(default = "wakes")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0))]
+    pub wake_speed_scaled: f64,
+    /// The same below which grains rest.
+    #[serde(default = "rests")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 10.0))]
+    pub rest_speed_scaled: f64,
+    /// Rest over √(diameter of the ball/gravity) after which a side of a moving box goes inwards; every move outwards
+    /// doubles it.
+    #[serde(default = "holds")]
+    #[schemars(extend("minimum" = 0.0, "maximum" = 1000.0))]
+    pub hold_scaled: f64,
+    /// Most grains, the ball included, with zones.moving: a box does not grow where that would make more.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minimum" = 1, "maximum" = 1.0e9))]
+    pub budget: Option<u64>,
+}
+
+fn wakes() -> f64 {
+    0.1
+}
+
+fn rests() -> f64 {
+    0.001
+}
+
+fn holds() -> f64 {
+    0.5
 }
 
 fn three() -> f64 {
@@ -46,6 +86,12 @@ impl Default for BallZoneKeys {
             half_width: None,
             depth: None,
             cell_diameters: three(),
+            moving: false,
+            near_diameters: None,
+            wake_speed_scaled: wakes(),
+            rest_speed_scaled: rests(),
+            hold_scaled: holds(),
+            budget: None,
         }
     }
 }
@@ -120,8 +166,40 @@ impl BallImpactScene {
     pub fn zone_depth(&self, diameter: f64) -> f64 {
         match self.zones.depth {
             Some(given) => self.scale * given,
-            None => 2.0 * UNDER * self.ball_radius() + self.overlap_width(diameter),
+            None if self.zones.moving => {
+                let free = self.ball_radius() + AROUND * diameter;
+                free + self.overlap_width(diameter)
+            }
+            None => self.lasting_depth(diameter),
         }
+    }
+
+    /// Depth of a box that need not grow, where nobody says how deep it is (m).
+    pub fn lasting_depth(&self, diameter: f64) -> f64 {
+        2.0 * UNDER * self.ball_radius() + self.overlap_width(diameter)
+    }
+
+    /// Diameters between ball and overlap below which a side goes outwards, given or computed: a box that is rounded to whole
+    /// cells is not too narrow from the start.
+    pub fn near_diameters(&self) -> f64 {
+        let computed = (AROUND - 0.5 * self.zones.cell_diameters).max(1.0);
+        self.zones.near_diameters.unwrap_or(computed)
+    }
+
+    /// When the box grows and shrinks, if it moves.
+    pub fn growth(&self, diameter: f64, settings: &Resolved) -> Option<Growth> {
+        let zones = &self.zones;
+        zones.moving.then(|| Growth {
+            travel: Travel {
+                width: settings.buffer,
+                rest: zones.rest_speed_scaled * self.speed,
+                wake: zones.wake_speed_scaled * self.speed,
+                hold: zones.hold_scaled * (2.0 * self.ball_radius() / self.gravity).sqrt(),
+                budget: zones.budget.map_or(f64::INFINITY, |most| most as f64),
+                fewest: FEWEST_GRAINS,
+            },
+            near: self.near_diameters() * diameter,
+        })
     }
 
     /// The overlap's settings with nothing left out.
@@ -158,6 +236,19 @@ impl BallImpactScene {
         }
         let materials = self.materials(origin)?;
         self.overlap_settings(origin)?;
+        let zones = &self.zones;
+        if let (Some(budget), false) = (zones.budget, zones.moving) {
+            let range =
+                "given with zones.moving = true: a box that stays has no other number of grains";
+            return Err(at("zones").refuse("budget", budget, range));
+        }
+        if zones.wake_speed_scaled <= zones.rest_speed_scaled {
+            let range = format!(
+                "above zones.rest_speed_scaled = {}",
+                zones.rest_speed_scaled
+            );
+            return Err(at("zones").refuse("wake_speed_scaled", zones.wake_speed_scaled, range));
+        }
         let keys = &self.continuum;
         let own = [keys.mu_s, keys.mu_2, keys.i_0];
         if keys.calibrated.word().is_none() && own.iter().any(Option::is_none) {

@@ -160,7 +160,7 @@ const FLOWS: f64 = 0.8;
 /// Column heights behind the edge of which the continuum is computed, if nobody says how many.
 const BEHIND: f64 = 1.5;
 /// Fewest grains beyond the overlap of an edge that moves.
-const FEWEST_GRAINS: f64 = 50.0;
+pub(super) const FEWEST_GRAINS: f64 = 50.0;
 /// Fewest diameters of continuum behind the edge, and of grains in front of the overlap.
 const LEAST_CONTINUUM: f64 = 3.0;
 const LEAST_GRAINS: f64 = 4.0;

@@ -9,6 +9,9 @@ pub struct Account {
     pub mass: f64,
     /// Volume that the copy was given when it was made anew, in the continuum's own unit.
     pub copied: f64,
+    /// Mass that became grains beyond that of the continuum whose place they took, and that no surface of the continuum
+    /// was there to take off.
+    pub carried: f64,
     /// Momentum of the grains when the bed was cut, with what walls had taken.
     pub grains_before: Vector3<f64>,
     /// Weight of the grains.
@@ -23,10 +26,14 @@ pub struct Account {
     pub answer: Vector3<f64>,
     /// Of the relaxation on cells that had no velocity to take it.
     pub untaken: Vector3<f64>,
+    /// Momentum of grains that were put in, less that of grains taken out.
+    pub handed: Vector3<f64>,
+    /// Momentum that moves of the box added to both sides together, which the continuum gives back.
+    pub settled: Vector3<f64>,
 }
 
 /// Numbers of an account.
-pub const NUMBERS: usize = 23;
+pub const NUMBERS: usize = 30;
 
 impl Account {
     /// All of it in a row of numbers.
@@ -39,19 +46,22 @@ impl Account {
             self.relaxation,
             self.answer,
             self.untaken,
+            self.handed,
+            self.settled,
         ];
-        std::array::from_fn(|k| match k.checked_sub(2) {
-            None => [self.mass, self.copied][k],
+        std::array::from_fn(|k| match k.checked_sub(3) {
+            None => [self.mass, self.copied, self.carried][k],
             Some(k) => rows[k / 3][k % 3],
         })
     }
 
     /// From such numbers.
     pub fn of(n: &[f64; NUMBERS]) -> Self {
-        let row = |k: usize| Vector3::new(n[2 + 3 * k], n[3 + 3 * k], n[4 + 3 * k]);
+        let row = |k: usize| Vector3::new(n[3 + 3 * k], n[4 + 3 * k], n[5 + 3 * k]);
         Self {
             mass: n[0],
             copied: n[1],
+            carried: n[2],
             grains_before: row(0),
             weight: row(1),
             traction: row(2),
@@ -59,12 +69,20 @@ impl Account {
             relaxation: row(4),
             answer: row(5),
             untaken: row(6),
+            handed: row(7),
+            settled: row(8),
         }
     }
 
     /// Error of the grains' account over its largest entry, for their momentum now with what walls have taken.
     pub fn grains_error(&self, now: Vector3<f64>) -> f64 {
-        let entries = [self.weight, self.traction, self.impedance, self.relaxation];
+        let entries = [
+            self.weight,
+            self.traction,
+            self.impedance,
+            self.relaxation,
+            self.handed,
+        ];
         let miss = now - self.grains_before - entries.iter().sum::<Vector3<f64>>();
         over(miss, entries.into_iter().chain([now, self.grains_before]))
     }
@@ -72,7 +90,7 @@ impl Account {
     /// Error of what the relaxation gave to both sides, `owed` being what the continuum has still to take, over the
     /// largest entry.
     pub fn exchange_error(&self, owed: Vector3<f64>) -> f64 {
-        let miss = self.relaxation + self.answer + owed;
+        let miss = self.relaxation + self.answer + owed + self.settled;
         over(miss, [self.relaxation, self.weight].into_iter())
     }
 }

@@ -45,6 +45,7 @@ impl Bowl {
             self.exchange(simulation)?;
             self.made = 0;
             self.exchanges += 1;
+            self.grow(simulation)?;
         }
         self.lay(simulation)
     }

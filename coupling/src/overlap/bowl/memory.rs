@@ -4,6 +4,8 @@
 //! with their lengths before them.
 
 use super::account::{self, Account, Monitors};
+use super::journey::Journey;
+use super::zone::Zone;
 use super::{Bowl, BowlSpec, OverlapError, continuum};
 use crate::overlap::sighting::free_mass;
 use colluvium_dem::Simulation;
@@ -74,6 +76,9 @@ impl Bowl {
             put(&flat(row).collect::<Vec<f64>>());
         }
         put(&self.held.area);
+        self.journey.write(&mut put);
+        put(&self.layout.zone.corners());
+        put(&[self.start_volume]);
         continuum::write(self.flow.state(), &mut put);
     }
 
@@ -121,15 +126,36 @@ impl Bowl {
         else {
             return Ok(None);
         };
+        let Some(journey) = Journey::read(&mut take) else {
+            return Ok(None);
+        };
+        let (Some(&[x, y, z, high_x, high_y]), Some(&[start_volume])) = (take(), take()) else {
+            return Ok(None);
+        };
         let Some(state) = continuum::read(&mut take) else {
             return Ok(None);
         };
         let mut bowl = Self::around(spec, spec.layout(height)?, simulation)?;
+        let [low_x, low_y, low_z, high_x, high_y] = [x, y, z, high_x, high_y].map(|n| n as usize);
+        let grid = bowl.layout.cells.counts;
+        if high_x > grid[0]
+            || high_y > grid[1]
+            || low_x >= high_x
+            || low_y >= high_y
+            || low_z >= grid[2]
+        {
+            return Ok(None);
+        }
+        let cells = bowl.layout.cells;
+        bowl.take_zone(Zone::new(&cells, [low_x, low_y, low_z], [high_x, high_y]));
+        bowl.journey = journey;
+        bowl.start_volume = start_volume;
+        let cells = cells.count();
         let (layer, faces) = (
             bowl.layout.cells.counts[0] * bowl.layout.cells.counts[1],
             bowl.faces.all.len(),
         );
-        let fits = bowl.layout.cells.count() == cells
+        let fits = memory[0] as usize == cells
             && columns.len() == layer
             && moved.len() == faces
             && stress.len() == 6 * cells

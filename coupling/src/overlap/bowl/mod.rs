@@ -20,14 +20,19 @@ mod cells;
 mod continuum;
 mod copy;
 mod exchange;
+mod growth;
+mod journey;
 mod memory;
+mod room;
 #[cfg(test)]
 mod rotation;
+mod settlement;
 mod watch;
 mod zone;
 
 pub use account::{Account, Monitors};
 pub use cells::Cells;
+pub use journey::{Growth, Move, Reason};
 pub use zone::Zone;
 
 use super::OverlapError;
@@ -39,6 +44,7 @@ use colluvium_continuum::rheology::MuI;
 use colluvium_continuum::units::Units;
 use colluvium_dem::{GrainSample, Simulation};
 use continuum::View;
+use journey::Journey;
 use nalgebra::Vector3;
 use zone::Faces;
 
@@ -70,6 +76,8 @@ pub struct BowlSpec {
     pub settings: Resolved,
     /// Number of the grain that belongs to neither side.
     pub ball: Option<u32>,
+    /// When the box grows and shrinks, if it does.
+    pub growth: Option<Growth>,
 }
 
 /// The grid and the box in it.
@@ -136,20 +144,20 @@ impl BowlSpec {
         };
         let [mx, my] = [margin(0), margin(1)];
         let mz = (self.bottom / cells.spacing[2]).round().max(0.0) as usize;
-        // Cells of grains beyond the overlap along an axis with that many sides.
-        let inside = |all: usize, margins: [usize; 2]| {
-            let sides = margins.iter().filter(|m| **m > 0).count() as f64;
-            all as f64 - margins[0] as f64 - margins[1] as f64 - sides * widths[1]
-        };
-        for (key, value, left) in [
-            ("half_width", self.half[0], inside(x, [mx, mx])),
-            ("half_width", self.half[1], inside(y, [my, my])),
-            ("bottom", self.bottom, inside(filled, [mz, 0])),
+        let zone = Zone::new(
+            &cells,
+            [mx, my, mz],
+            [x.saturating_sub(mx), y.saturating_sub(my)],
+        );
+        for (axis, key, value) in [
+            (0, "half_width", self.half[0]),
+            (1, "half_width", self.half[1]),
+            (2, "bottom", self.bottom),
         ] {
             let allowed = "such that a cell of grains is left beyond the overlap";
+            let left = zone.inside(axis, filled, widths[1]);
             check(key, value, left >= 1.0, allowed)?;
         }
-        let zone = Zone::new(&cells, [mx, my, mz], [x - mx, y - my]);
         let allowed = "such that some continuum is left around the grains";
         check("half_width", self.half[0], !zone.sides.is_empty(), allowed)?;
         Ok(Layout {
@@ -262,6 +270,7 @@ pub struct Bowl {
     owed: Vec<Vector3<f64>>,
     /// How far grains have moved outwards through each face of the box (m).
     moved: Vec<f64>,
+    journey: Journey,
     account: Account,
     monitors: Monitors,
     /// Steps for which loads are held, how often until an exchange, and how often since the last one.
@@ -297,7 +306,12 @@ impl Bowl {
         let belongs = spec.belongs();
         let bed = bowl.sighting.snapshot.grains.iter().filter(|g| belongs(g));
         bowl.account.mass = bed.map(|grain| grain.mass).sum();
-        simulation.remove(|g| belongs(g) && zone.label(&cells, &g.position) < 0.0);
+        match spec.growth {
+            Some(_) => bowl.put_by(simulation)?,
+            None => {
+                simulation.remove(|g| belongs(g) && zone.label(&cells, &g.position) < 0.0);
+            }
+        }
         bowl.sighting.look(simulation);
         bowl.see_grains();
         bowl.columns = bowl.column_masses();
@@ -330,19 +344,12 @@ impl Bowl {
             f64::from(u8::from(is_bed))
         });
         let flow = continuum::bed(cells, fractions.collect(), &spec.law, &units, &spec.options)?;
-        let faces = Faces::of(cells, zone);
-        let narrowed = zone.narrowed(cells, widths[0] as usize);
-        let handshake = Faces::of(cells, &narrowed);
         let steps_of_loads = Self::steps_of_loads(&spec.settings, simulation.timestep());
         let load_time = steps_of_loads as f64 * simulation.timestep();
         let loads = (spec.settings.exchange_time / load_time).round().max(1.0);
-        let (count, sides) = (cells.count(), faces.all.len());
-        let shell = spec.settings.shell / spec.settings.cell;
-        let least = |side: &zone::Side| {
-            let width = shell * cells.spacing[side.axis];
-            LEAST_SHELL * 0.5 * spec.density() * width * cells.face_area(side.axis)
-        };
-        Ok(Self {
+        let count = cells.count();
+        let zone = zone.clone();
+        let mut bowl = Self {
             units,
             grain_mass: 0.0,
             start_volume: flow.volume(),
@@ -352,15 +359,14 @@ impl Bowl {
             view: View::default(),
             held: Held {
                 accelerations: vec![Vector3::zeros(); count],
-                traction: vec![Vector3::zeros(); sides],
-                area: vec![0.0; sides],
-                velocity: vec![Vector3::zeros(); sides],
+                ..Held::default()
             },
             laid: Given::nothing(count),
             given: Given::nothing(count),
             laid_at: simulation.steps_done(),
             owed: vec![Vector3::zeros(); count],
-            moved: vec![0.0; sides],
+            moved: Vec::new(),
+            journey: Journey::default(),
             account: Account::default(),
             monitors: Monitors::default(),
             steps_of_loads,
@@ -371,12 +377,34 @@ impl Bowl {
             sighting: Sighting::default(),
             scratch: exchange::Scratch::default(),
             outside: Outside::nothing(count),
-            least: zone.sides.iter().map(least).collect(),
-            faces,
-            handshake,
+            least: Vec::new(),
+            faces: Faces::default(),
+            handshake: Faces::default(),
             spec,
             layout,
-        })
+        };
+        bowl.take_zone(zone);
+        Ok(bowl)
+    }
+
+    /// Takes a box for its own: the faces of its sides, on which nothing acts yet.
+    fn take_zone(&mut self, zone: Zone) {
+        let cells = &self.layout.cells;
+        self.faces = Faces::of(cells, &zone);
+        let narrowed = zone.narrowed(cells, self.layout.widths[0] as usize);
+        self.handshake = Faces::of(cells, &narrowed);
+        let shell = self.spec.settings.shell / self.spec.settings.cell;
+        let least = |side: &zone::Side| {
+            let width = shell * cells.spacing[side.axis];
+            LEAST_SHELL * 0.5 * self.spec.density() * width * cells.face_area(side.axis)
+        };
+        self.least = zone.sides.iter().map(least).collect();
+        let faces = self.faces.all.len();
+        self.held.traction = vec![Vector3::zeros(); faces];
+        self.held.area = vec![0.0; faces];
+        self.held.velocity = vec![Vector3::zeros(); faces];
+        self.moved = vec![0.0; faces];
+        self.layout.zone = zone;
     }
 
     /// What it was made from.
@@ -457,10 +485,9 @@ impl Bowl {
     /// Farthest that grains have moved through a face of the box in the mean, outwards positive (m).
     pub fn farthest_moved(&self) -> f64 {
         let sizes = self.moved.iter().copied();
-        sizes.fold(
-            0.0,
-            |most: f64, m| if m.abs() > most.abs() { m } else { most },
-        )
+        sizes.fold(self.journey.farthest, |most: f64, m| {
+            if m.abs() > most.abs() { m } else { most }
+        })
     }
 
     /// Distance between the ball's surface and the handshake surface (m), none without a ball: what comes beyond it

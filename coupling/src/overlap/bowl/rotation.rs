@@ -66,6 +66,7 @@ fn joined(rate: Vector3<f64>, drift: Vector3<f64>, ours: Vector3<f64>) -> Bowl {
         bottom: 2.0,
         settings: settings.resolve(&scales, false).unwrap(),
         ball: None,
+        growth: None,
     };
     let mut bowl = Bowl::cut(spec, &mut simulation).unwrap();
     let centre = Vector3::new(0.4, 0.6, 0.5) * width;

@@ -14,7 +14,15 @@ pub struct Side {
     pub outwards: f64,
 }
 
+/// Sides that a box may have: low and high along x, low and high along y, and its bottom.
+pub const SIDES: usize = 5;
+
 impl Side {
+    /// Its number in that order.
+    pub fn number(&self) -> usize {
+        2 * self.axis + usize::from(self.outwards > 0.0)
+    }
+
     /// The cells outside and inside it, at a place along its own axis.
     fn cells(&self) -> [usize; 2] {
         match self.outwards > 0.0 {
@@ -76,6 +84,30 @@ impl Zone {
             high => high,
         });
         Self::new(cells, low, high)
+    }
+
+    /// The box with a side so many cells farther out, or in if negative; a side that comes to a wall is gone.
+    pub fn moved(&self, cells: &Cells, side: &Side, by: isize) -> Self {
+        let (mut low, mut high) = (self.low, self.high);
+        let axis = side.axis;
+        match side.outwards > 0.0 {
+            true => high[axis] = high[axis].saturating_add_signed(by).min(cells.counts[axis]),
+            false => low[axis] = low[axis].saturating_add_signed(-by),
+        }
+        Self::new(cells, low, [high[0], high[1]])
+    }
+
+    /// Its first cells along all axes and those behind its last along x and y, as numbers.
+    pub fn corners(&self) -> [f64; 5] {
+        let [x, y, z] = self.low;
+        [x, y, z, self.high[0], self.high[1]].map(|n| n as f64)
+    }
+
+    /// Cells along an axis that lie farther inside than this from both of its sides, of so many filled ones upwards.
+    pub fn inside(&self, axis: usize, filled: usize, width: f64) -> f64 {
+        let sides = self.sides.iter().filter(|s| s.axis == axis).count() as f64;
+        let high = if axis < 2 { self.high[axis] } else { filled };
+        high as f64 - self.low[axis] as f64 - sides * width
     }
 
     /// Distance of a place from a side into the grains, in cells.
@@ -190,6 +222,22 @@ mod tests {
         assert_eq!(label([1.5, 1.0, 2.0]), -0.5);
         assert_eq!(zone.label_of_cell([3, 0, 1]), 0.5);
         assert_eq!(Zone::new(&CELLS, [0, 0, 0], [8, 6]).sides.len(), 0);
+    }
+
+    #[test]
+    fn a_side_that_comes_to_a_wall_is_gone() {
+        let zone = Zone::new(&CELLS, [2, 0, 1], [6, 4]);
+        let numbers = |zone: &Zone| zone.sides.iter().map(Side::number).collect::<Vec<_>>();
+        assert_eq!(numbers(&zone), [0, 1, 3, 4]);
+        let wider = zone.moved(&CELLS, &zone.sides[0], 1);
+        assert_eq!((wider.low, wider.high), ([1, 0, 1], [6, 4, 5]));
+        assert_eq!(wider.moved(&CELLS, &wider.sides[0], -1), zone);
+        let open = wider.moved(&CELLS, &wider.sides[1], 5);
+        assert_eq!((numbers(&open), open.high[0]), (vec![0, 3, 4], 8));
+        let deep = open.moved(&CELLS, &open.sides[2], 3);
+        assert_eq!(numbers(&deep), [0, 3]);
+        assert_eq!(zone.inside(0, 4, 1.0), 2.0);
+        assert_eq!(zone.inside(2, 4, 1.0), 2.0);
     }
 
     #[test]

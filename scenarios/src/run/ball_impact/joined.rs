@@ -5,6 +5,7 @@
 
 use super::super::surface_fields::space_frame;
 use super::super::world::{Course, Expected, Ran, Recipe, as_the_scene};
+use super::moves;
 use crate::failure::Failure;
 use crate::rheology_file::RheologyFile;
 use crate::scene::world::Materials;
@@ -104,6 +105,7 @@ impl<'a> JoinedBed<'a> {
         let law = self.law(solid)?;
         let size = [scene.container.length, scene.container.width].map(|e| scene.scale * e);
         let half = scene.half_width(law.diameter);
+        let settings = scene.overlap_settings(&self.origin)?;
         Ok(BowlSpec {
             low: [-0.5 * size[0], -0.5 * size[1], scene.floor()],
             size,
@@ -111,7 +113,8 @@ impl<'a> JoinedBed<'a> {
             options: SurfaceOptions::default(),
             half: [half; 2],
             bottom: (surface - scene.zone_depth(law.diameter) - scene.floor()).max(0.0),
-            settings: scene.overlap_settings(&self.origin)?,
+            growth: scene.growth(law.diameter, &settings),
+            settings,
             ball: Some(ball),
             law,
         })
@@ -155,17 +158,23 @@ impl<'a> JoinedBed<'a> {
         volume / (DENSE * scene.area())
     }
 
-    /// Share of the bed's volume that stays grains.
-    fn expected_share(&self) -> f64 {
+    /// Share of the bed's volume that is grains: at the start, and in a box as deep as one that stays would be if this one
+    /// grows.
+    fn expected_shares(&self) -> [f64; 2] {
         let scene = self.scene;
         let Ok(materials) = scene.materials(&self.origin) else {
-            return 1.0;
+            return [1.0; 2];
         };
         let d = scene.grain_diameter(&materials);
         let half = scene.half_width(d);
         let edges = [scene.container.length, scene.container.width].map(|e| 0.5 * scene.scale * e);
         let across: f64 = edges.iter().map(|edge| (half / edge).min(1.0)).product();
-        across * (scene.zone_depth(d) / self.expected_height(d)).min(1.0)
+        let start = scene.zone_depth(d);
+        let last = match scene.zones.moving {
+            true => start.max(scene.lasting_depth(d)),
+            false => start,
+        };
+        [start, last].map(|depth| across * (depth / self.expected_height(d)).min(1.0))
     }
 }
 
@@ -177,8 +186,12 @@ fn last(simulation: &Simulation) -> u32 {
 impl Recipe for JoinedBed<'_> {
     fn about(&self) -> String {
         format!(
-            "{}; beyond a box about the ball the bed is a continuum",
-            self.scene.about()
+            "{}; beyond a box about the ball{} the bed is a continuum",
+            self.scene.about(),
+            match self.scene.zones.moving {
+                true => ", which grows where it has to,",
+                false => "",
+            }
         )
     }
 
@@ -194,7 +207,7 @@ impl Recipe for JoinedBed<'_> {
     fn expected(&self, materials: &Materials) -> Expected {
         let all = self.scene.expected(materials);
         Expected {
-            grains: all.grains * self.expected_share(),
+            grains: all.grains * self.expected_shares()[1],
             ..all
         }
     }
@@ -204,7 +217,10 @@ impl Recipe for JoinedBed<'_> {
         own.extend([
             "granular temperature, dilatancy and compaction of the continuum",
             "spins across the box",
-            "exchange of mass through the box (it stays, and little moves there)",
+            match self.scene.zones.moving {
+                true => "exchange of mass through the box but by whole strips",
+                false => "exchange of mass through the box (it stays, and little moves there)",
+            },
             "friction of the container's side walls on the continuum, slip on its floor",
         ]);
         own
@@ -235,9 +251,32 @@ impl Recipe for JoinedBed<'_> {
                 scene.zone_depth(d),
                 scene.zone_depth(d) / d,
                 why(scene.zones.depth),
-                100.0 * self.expected_share()
+                100.0 * self.expected_shares()[0]
             ),
         ));
+        if let Some(growth) = scene.growth(d, &s) {
+            let travel = &growth.travel;
+            let most = match scene.zones.budget {
+                Some(most) => format!("never to more than {most} grains (zones.budget)"),
+                None => "as far as the container reaches (zones.budget left out)".into(),
+            };
+            lines.push((
+                "box".into(),
+                format!(
+                    "moves by {:.4} m: a side goes outwards where the ball is nearer than {:.4} m (zones.near_diameters {}) to the inner end of its \
+                     overlap, or grains beside that are faster than {:.3e} m/s (zones.wake_speed_scaled), {most}; inwards where they have been slower \
+                     than {:.3e} m/s (zones.rest_speed_scaled) for {:.3e} s (zones.hold_scaled); predicted, if it comes to be as deep as a box that \
+                     stays: {:.0} % of the grain-steps of a bed of grains in the end",
+                    s.buffer,
+                    growth.near,
+                    why(scene.zones.near_diameters),
+                    travel.wake,
+                    travel.rest,
+                    travel.hold,
+                    100.0 * self.expected_shares()[1]
+                ),
+            ));
+        }
         lines.push((
             "overlap".into(),
             format!(
@@ -322,7 +361,7 @@ impl Recipe for JoinedBed<'_> {
     }
 
     fn conclude(&self, ran: &mut Ran, summary: &mut Summary) -> Result<Vec<Table>, Failure> {
-        let tables = self.scene.conclude(ran, summary)?;
+        let mut tables = self.scene.conclude(ran, summary)?;
         let bowl = self.recalled(&ran.simulation, &ran.state)?;
         self.book(ran, &bowl, summary);
         self.watch(&bowl, summary);
@@ -334,10 +373,16 @@ impl Recipe for JoinedBed<'_> {
         );
         if clearance <= 0.0 {
             summary.remarks.push(format!(
-                "The ball came to the overlap after {:.4} s and the run ended there: the continuum knows of no ball. zones.depth or \
-                 zones.half_width is too small for it.",
-                ran.simulation.time()
+                "The ball came to the overlap after {:.4} s and the run ended there: the continuum knows of no ball. {}",
+                ran.simulation.time(),
+                match self.scene.zones.moving {
+                    true => "The box could not grow as fast as needed: see the moves that were refused, and zones.near_diameters.",
+                    false => "zones.depth or zones.half_width is too small for it; zones.moving = true lets the box grow.",
+                }
             ));
+        }
+        if self.scene.zones.moving {
+            tables.extend(moves::table(&bowl, summary));
         }
         summary.state_hash = state_hash::of_hashes(
             [ran.simulation.state_hash(), state_hash::of(&[&ran.state])]
