@@ -5,11 +5,19 @@
 //! 1.24 a for a < 1.7, whatever the grains: Lube, Huppert, Sparks & Hallworth, *J. Fluid Mech.* 508 (2004)
 //! 175; Lajeunesse, Mangeney-Castelnau & Vilotte, *Phys. Fluids* 16 (2004) 2371.
 //!
+//! It may stand on ground instead ([`CylinderGround`]), which cuts the cells of the grid.
+//!
 //! The grid knows nothing of the cylinder's axis: its cells are cubes. A quarter of the cylinder between
 //! two planes of symmetry is enough; the whole of it shows how symmetric the computation is.
 
+mod ground;
+mod heap;
+
 use serde::{Deserialize, Serialize};
 
+pub use self::ground::CylinderGround;
+use self::ground::Laid;
+pub use self::heap::CylinderFront;
 use crate::error::{Error, require};
 use crate::free_surface::{
     Contact, SpaceFields, SpaceFlow, SpaceState, SurfaceOptions, SurfaceStep,
@@ -47,21 +55,6 @@ const ROOM_ABOVE: f64 = 1.1;
 const FEWEST_CELLS: f64 = 3.0;
 /// Material counts as at rest when nothing moves faster than this many ε H.
 const REST_SPEED: f64 = 5.0;
-
-/// Where the heap is at one time; SI units.
-#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
-pub struct CylinderFront {
-    /// Time (s).
-    pub time: f64,
-    /// Radius of the disc of the same area as the ground under a heap as high as the threshold (m).
-    pub radius: f64,
-    /// Where the heap reaches down to the threshold along an axis of the grid (m).
-    pub along_axis: f64,
-    /// The same along the diagonal between two axes (m).
-    pub along_diagonal: f64,
-    /// Greatest height of the heap (m).
-    pub height: f64,
-}
 
 impl CylinderCase {
     /// Radius r_0 = H/a of the cylinder (m).
@@ -209,6 +202,7 @@ pub struct CylinderCollapse {
     case: CylinderCase,
     units: Units,
     flow: SpaceFlow<MuI>,
+    ground: Option<Laid>,
     rest_speed: f64,
     start_volume: f64,
 }
@@ -220,14 +214,47 @@ impl CylinderCollapse {
     /// Parameters or settings out of range.
     pub fn new(case: &CylinderCase, options: &SurfaceOptions) -> Result<Self, Error> {
         case.validate()?;
-        let flow = case.flow(options)?;
-        Ok(Self {
+        Ok(Self::of(case, options, case.flow(options)?, None))
+    }
+
+    /// The cylinder on ground before it is let go; the case's floor does not count.
+    ///
+    /// # Errors
+    /// Parameters or settings out of range, or ground that does not span the grid.
+    pub fn over_ground(
+        case: &CylinderCase,
+        options: &SurfaceOptions,
+        ground: &CylinderGround,
+    ) -> Result<Self, Error> {
+        case.validate()?;
+        let (flow, laid) = case.flow_over(ground, options)?;
+        Ok(Self::of(case, options, flow, Some(laid)))
+    }
+
+    fn of(
+        case: &CylinderCase,
+        options: &SurfaceOptions,
+        flow: SpaceFlow<MuI>,
+        ground: Option<Laid>,
+    ) -> Self {
+        Self {
             case: *case,
             units: case.units(),
             rest_speed: REST_SPEED * options.solver.strain_rate_floor,
             start_volume: flow.volume(),
             flow,
-        })
+            ground,
+        }
+    }
+
+    /// Mean height of the ground in each column of cells (m), x fastest; none on a level floor.
+    pub fn ground_heights(&self) -> &[f64] {
+        self.ground.as_ref().map_or(&[], |laid| &laid.heights)
+    }
+
+    /// Height of the grid's lower edge (m).
+    pub fn bottom(&self) -> f64 {
+        self.ground.as_ref().map_or(0.0, |laid| laid.bottom)
     }
 
     /// The natural units of the computation.
@@ -312,75 +339,10 @@ impl CylinderCollapse {
             for corner in [&mut f.lower, &mut f.upper] {
                 corner[0] -= edge;
                 corner[1] -= edge;
+                corner[2] += self.bottom();
             }
         }
         fields
-    }
-
-    /// Heights of material above the cells of a quarter of the floor (m), x fastest, from the axis outwards.
-    fn quarter_heights(&self) -> Vec<f64> {
-        let columns = self.case.columns();
-        let first = columns - self.case.cells;
-        let heights = self.flow.heights();
-        (first..columns)
-            .flat_map(|j| (first..columns).map(move |i| i + columns * j))
-            .map(|column| heights[column] * self.case.height)
-            .collect()
-    }
-
-    /// Heights of the heap by distance from the axis: mean distance and mean height of the columns of cells
-    /// in rings one cell wide (m).
-    pub fn profile(&self) -> (Vec<f64>, Vec<f64>) {
-        let cells = self.case.cells;
-        let spacing = self.case.spacing() * self.case.height;
-        let mut rings = vec![[0.0; 3]; cells];
-        for (column, height) in self.quarter_heights().into_iter().enumerate() {
-            let [x, y] = [column % cells, column / cells].map(|n| n as f64 + 0.5);
-            let distance = x.hypot(y);
-            if let Some(ring) = rings.get_mut(distance as usize) {
-                ring[0] += 1.0;
-                ring[1] += distance * spacing;
-                ring[2] += height;
-            }
-        }
-        let filled = rings.iter().filter(|ring| ring[0] > 0.0);
-        filled.map(|[n, r, h]| (r / n, h / n)).unzip()
-    }
-
-    /// Where the heap reaches down to a height (m).
-    pub fn front(&self, threshold: f64) -> CylinderFront {
-        let cells = self.case.cells;
-        let spacing = self.case.spacing() * self.case.height;
-        let heights = self.quarter_heights();
-        // Cells from the axis at which a line of heights falls to the threshold for good.
-        let reach = |line: &dyn Fn(usize) -> f64| {
-            let last = (0..cells).rev().find(|&i| line(i) >= threshold);
-            match last {
-                None => 0.0,
-                Some(i) if i + 1 == cells => cells as f64,
-                Some(i) => {
-                    let (here, next) = (line(i), line(i + 1));
-                    i as f64 + 0.5 + (here - threshold) / (here - next)
-                }
-            }
-        };
-        // Along both axes, so that neither is preferred.
-        let area: f64 = (0..cells)
-            .map(|n| {
-                let along_x = reach(&|i| heights[i + cells * n]);
-                let along_y = reach(&|j| heights[n + cells * j]);
-                0.5 * (along_x + along_y)
-            })
-            .sum();
-        CylinderFront {
-            time: self.time(),
-            radius: (4.0 / std::f64::consts::PI * area).sqrt() * spacing,
-            along_axis: reach(&|i| heights[i]) * spacing,
-            along_diagonal: reach(&|i| heights[i * (cells + 1)])
-                * spacing
-                * std::f64::consts::SQRT_2,
-            height: heights.iter().fold(0.0, |most, h| h.max(most)),
-        }
     }
 }
 

@@ -11,12 +11,14 @@
 //! Nothing is sampled, overhangs need no special case, and per cell the free parts of the faces and the
 //! wall close to a vector of zero to round-off.
 
+mod heights;
 mod nearest;
 mod profile;
 mod raster;
 mod section;
 mod surface;
 
+pub use heights::HeightSum;
 pub use profile::Profile;
 pub use raster::HeightRaster;
 pub use surface::Surface;

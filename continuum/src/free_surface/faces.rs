@@ -278,8 +278,8 @@ impl<const D: usize> Faces<D> {
                 return host;
             }
         }
-        // Material must not be lost; what is empty may do without.
-        any.filter(|_| most > 0.0)
+        // Material must not be lost; what is empty may do without, and what lies over ground is an unknown then.
+        any.filter(|_| most > 0.0 && self.shares.is_none())
     }
 
     /// The unknown of a face itself.

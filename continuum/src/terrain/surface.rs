@@ -86,7 +86,7 @@ fn span(polygon: &[[f64; 3]], axis: usize) -> [f64; 2] {
 }
 
 /// The part of a convex polygon on one side of a grid plane: `above` it or below.
-fn clip(polygon: &[[f64; 3]], axis: usize, at: f64, above: bool) -> Vec<[f64; 3]> {
+pub(super) fn clip(polygon: &[[f64; 3]], axis: usize, at: f64, above: bool) -> Vec<[f64; 3]> {
     let side = |corner: &[f64; 3]| {
         let d = corner[axis] - at;
         if above { d } else { -d }
@@ -204,8 +204,23 @@ fn add_column(
             lines.holds(axis, index, x, low, high)
         })
     });
+    let lowest = span(column, 2)[0];
     for k in 0..lines.cells[2] {
+        if above_low.is_empty() {
+            break;
+        }
         let (z0, z1) = (lines.local_line(2, k), lines.local_line(2, k + 1));
+        if z1 < lowest {
+            // All of it lies above the cell.
+            let [_, volume_high] = shadow(&above_low, z1);
+            cut.volumes[lines.number([i, j, k], None)] += volume - volume_high;
+            cut.apertures[2][lines.number([i, j, k], Some(2))] += area;
+            if k + 1 == lines.cells[2] {
+                cut.apertures[2][lines.number([i, j, k + 1], Some(2))] += area;
+            }
+            volume = volume_high;
+            continue;
+        }
         let above_high = clip(&above_low, 2, z1, true);
         let [area_high, volume_high] = shadow(&above_high, z1);
         cut.volumes[lines.number([i, j, k], None)] += volume - volume_high;

@@ -4,8 +4,8 @@
 //! cells that share its pressure. A thin layer on a slope has no unknown for its component along the axis that the
 //! ground's normal leans to most; that one is what the others give times the slope.
 
-use super::Ground;
 use super::layers::EMPTY;
+use super::{DUST, Ground};
 use crate::free_surface::faces::{ACTIVE, Face, Faces, NOBODY, THINNEST_LAYER, ThinLayer};
 use crate::free_surface::topology::{NONE, Topology};
 use crate::free_surface::transport::MASSLESS;
@@ -58,7 +58,8 @@ pub(crate) fn faces_over<const D: usize>(
         }
     }
     let none = || std::array::from_fn(|_| Vec::new());
-    let mut shares = faces.shares.take().unwrap_or_else(none);
+    let mut shares = faces.shares.replace(none()).unwrap_or_else(none);
+    let mut lying = Vec::new();
     for (j, &(component, face)) in faces.own.iter().enumerate() {
         if !faces.is_thin[j] {
             shares[component][face] = ground.swell(component, face);
@@ -80,6 +81,10 @@ pub(crate) fn faces_over<const D: usize>(
                         }
                     } else if else_still {
                         faces.role[component][face] = Face::Still;
+                    } else if D > 2
+                        && lies_on_something(&faces, ground, topology, fractions, component, face)
+                    {
+                        lying.push((component, face));
                     }
                 }
                 Waiting::Layer => {
@@ -95,8 +100,34 @@ pub(crate) fn faces_over<const D: usize>(
             }
         }
     }
+    for own in lying {
+        faces.role[own.0][own.1] = Face::Own(faces.own.len());
+        faces.own.push(own);
+        faces.is_thin.push(false);
+    }
     faces.shares = Some(shares);
     faces
+}
+
+/// Whether material at a face along the ground lies on cells with a pressure or on ground, with no face to follow: what
+/// lies on faces that are shut. It has friction on what is below, and must not fly.
+fn lies_on_something<const D: usize>(
+    faces: &Faces<D>,
+    ground: &Ground<D>,
+    topology: &Topology<D>,
+    fractions: &[f64],
+    component: usize,
+    face: usize,
+) -> bool {
+    let last = D - 1;
+    component != last
+        && topology.face_mean(component, face, fractions) > EMPTY
+        && topology.face_cells[component][face].iter().any(|&cell| {
+            let below = topology.cell_neighbours[cell][last][0];
+            fractions[cell] > EMPTY
+                && below != NONE
+                && (ground.solid[below] > 0.0 || faces.pressure[ground.master[below]] != NONE)
+        })
 }
 
 fn own_role<const D: usize>(
@@ -119,6 +150,10 @@ fn own_role<const D: usize>(
         .all(|&cell| faces.pressure[ground.master[cell]] == NONE);
     if is_thin {
         let mass = topology.face_mean(component, face, fractions);
+        if D > 2 && mass <= DUST {
+            // Where some of it lies is a matter of round-off, and it must not fall for ever.
+            return (Face::Loose, Waiting::Host { else_still: true });
+        }
         let touches = cells.map(|cell| ground.wall[cell] != [0.0; D]);
         if mass <= MASSLESS || touches == [false; 2] || thin_layer == ThinLayer::Following {
             return (Face::Loose, free);

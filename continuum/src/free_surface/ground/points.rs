@@ -295,7 +295,9 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             let areas = weights(ground, edges);
             let inverse = 1.0 / (whole * self.grid.axes()[along].spacing());
             for (n, sign) in [-1.0, 1.0].into_iter().enumerate() {
-                if ends[n] == NONE {
+                // In space a point has room for one velocity of each face: the layer beside it, which has its own
+                // friction, counts as standing still.
+                if ends[n] == NONE || (D > 2 && matches!(roles[n], Face::Slides(_))) {
                     continue;
                 }
                 for (j, share) in self.faces.moved_by(component, ends[n], along) {

@@ -96,8 +96,11 @@ impl<const D: usize> Ground<D> {
             return None;
         }
         let beside = self.beside(topology, cell);
+        let room = |fractions: &[f64], next: usize| (self.free[next] - fractions[next]).max(0.0);
+        // In space no neighbour comes first.
+        let share = share_of(excess, beside, |next| room(fractions, next));
         for next in beside.into_iter().flatten().filter(|&next| next != NONE) {
-            let part = (self.free[next] - fractions[next]).max(0.0).min(excess);
+            let part = (share * room(fractions, next)).min(excess);
             fractions[next] += part;
             fractions[cell] -= part;
             excess -= part;
@@ -126,13 +129,30 @@ impl<const D: usize> Ground<D> {
         if fractions[cell] >= -EXCESS {
             return false;
         }
-        for next in self.beside(topology, cell).into_iter().flatten() {
+        let beside = self.beside(topology, cell);
+        let share = share_of(-fractions[cell], beside, |next| fractions[next].max(0.0));
+        for next in beside.into_iter().flatten() {
             if next != NONE {
-                let part = fractions[next].max(0.0).min(-fractions[cell]);
+                let part = (share * fractions[next].max(0.0)).min(-fractions[cell]);
                 fractions[next] -= part;
                 fractions[cell] += part;
             }
         }
         true
     }
+}
+
+/// The part of what neighbours have that an amount needs, if all give or take alike; in a plane they come one after the
+/// other.
+fn share_of<const D: usize>(
+    amount: f64,
+    beside: [[usize; 2]; D],
+    has: impl Fn(usize) -> f64,
+) -> f64 {
+    if D == 2 {
+        return 1.0;
+    }
+    let open = beside.into_iter().flatten().filter(|&next| next != NONE);
+    let all: f64 = open.map(has).sum();
+    if all > amount { amount / all } else { 1.0 }
 }
