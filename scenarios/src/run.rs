@@ -15,6 +15,7 @@ mod comet;
 mod comet_block;
 pub mod continuum_incline;
 pub mod cylinder;
+pub mod cylinder_ground;
 pub mod energy_table;
 pub mod grain_table;
 mod grains;

@@ -21,6 +21,7 @@ mod collapse_zones;
 mod comet;
 mod contact;
 mod cylinder;
+mod cylinder_terrain;
 mod error;
 mod friction_keys;
 mod friction_law;
@@ -58,6 +59,7 @@ pub use collapse_zones::{ColumnOverlapKeys, ColumnZoneKeys, DENSE};
 pub use comet::{CometBlockKeys, CometKeys, MixKind, Softness};
 pub use contact::SurfaceKeys;
 pub use cylinder::{CylinderGrid, CylinderScene};
+pub use cylinder_terrain::ReliefKeys;
 pub use error::SceneError;
 pub use friction_law::LawVisitor;
 pub use grains::GrainsScene;
@@ -279,6 +281,8 @@ impl Scene {
             }
             if matches!(kind, Family::Collapse) {
                 kinds::anchor_packing(&mut own, "grains.packing", folder);
+            }
+            if matches!(kind, Family::Collapse | Family::Cylinder) {
                 layers::anchor_path(&mut own, "terrain.heights", folder);
                 layers::anchor_path(&mut own, "terrain.mesh", folder);
             }
@@ -353,10 +357,12 @@ impl Scene {
             }
             _ => {}
         }
-        if let SceneBody::Collapse(body) = &body {
-            let terrain = body.terrain.as_ref().and_then(TerrainKeys::file);
-            inputs.extend(terrain.map(|(_, file)| PathBuf::from(file)));
-        }
+        let terrain = match &body {
+            SceneBody::Collapse(body) => body.terrain.as_ref().and_then(TerrainKeys::file),
+            SceneBody::Cylinder(body) => body.terrain.as_ref().and_then(ReliefKeys::file),
+            _ => None,
+        };
+        inputs.extend(terrain.map(|(_, file)| PathBuf::from(file)));
         let scene = Scene {
             name,
             body,
