@@ -42,7 +42,10 @@ pub fn plan(scene: &Scene) -> Result<String, Failure> {
             let ground = run::collapse_ground::ground(body, &scene.origin)?;
             Ok(collapse::collapse(body, ground.as_ref()))
         }
-        SceneBody::Cylinder(body) => Ok(cylinder::cylinder(body)),
+        SceneBody::Cylinder(body) => {
+            let ground = run::cylinder_ground::ground(body, &scene.origin)?;
+            Ok(cylinder::cylinder(body, ground.as_ref()))
+        }
         SceneBody::OpenChute(body) => open_chute::open_chute(scene, body),
         SceneBody::Impact(body) => impact(scene, body),
         SceneBody::Chute(body) => bed::chute(body),

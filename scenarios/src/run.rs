@@ -16,6 +16,7 @@ mod comet;
 mod comet_block;
 pub mod continuum_incline;
 pub mod cylinder;
+pub mod cylinder_ground;
 mod cylinder_of_grains;
 pub mod energy_table;
 pub mod grain_table;

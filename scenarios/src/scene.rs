@@ -23,6 +23,7 @@ mod comet;
 mod contact;
 mod cylinder;
 mod cylinder_of_grains;
+mod cylinder_terrain;
 mod error;
 mod friction_keys;
 mod friction_law;
@@ -63,6 +64,7 @@ pub use comet::{CometBlockKeys, CometKeys, MixKind, Softness};
 pub use contact::SurfaceKeys;
 pub use cylinder::{CylinderGrid, CylinderScene};
 pub use cylinder_of_grains::{GrainCylinderGrid, GrainCylinderKeys, GrainCylinderScene};
+pub use cylinder_terrain::ReliefKeys;
 pub use error::SceneError;
 pub use friction_law::LawVisitor;
 pub use grains::GrainsScene;
@@ -289,6 +291,8 @@ impl Scene {
             }
             if matches!(kind, Family::Collapse) {
                 kinds::anchor_packing(&mut own, "grains.packing", folder);
+            }
+            if matches!(kind, Family::Collapse | Family::Cylinder) {
                 layers::anchor_path(&mut own, "terrain.heights", folder);
                 layers::anchor_path(&mut own, "terrain.mesh", folder);
             }
@@ -363,10 +367,14 @@ impl Scene {
             }
             _ => {}
         }
-        if let SceneBody::Collapse(body) = &body {
-            let terrain = body.terrain.as_ref().and_then(|keys| keys.source().file());
-            inputs.extend(terrain.map(|(_, file)| PathBuf::from(file)));
-        }
+        let terrain = match &body {
+            SceneBody::Collapse(body) => {
+                body.terrain.as_ref().and_then(|keys| keys.source().file())
+            }
+            SceneBody::Cylinder(body) => body.terrain.as_ref().and_then(ReliefKeys::file),
+            _ => None,
+        };
+        inputs.extend(terrain.map(|(_, file)| PathBuf::from(file)));
         let scene = Scene {
             name,
             body,

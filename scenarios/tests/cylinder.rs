@@ -182,3 +182,85 @@ fn column_in_a_channel_with_walls_in_space() {
         assert!(!folder.path().join("x").exists());
     }
 }
+
+/// On a cone it runs farther out than on the level, and the tables and fields have the ground. What does not fit is
+/// refused by its key.
+#[test]
+fn cylinders_run_out_over_terrain() {
+    let folder = tempfile::tempdir().unwrap();
+    let small = ["--set", "grid.cells=9", "--set", "grid.length_scaled=2.4"];
+    let run = |out: &str, more: &[&str]| {
+        let base = [
+            "run",
+            "cylinder-collapse",
+            "--out",
+            out,
+            "--set",
+            "duration_scaled=1.5",
+        ];
+        succeed(folder.path(), &[&base[..], &small, more].concat());
+        summary(&folder.path().join(out))
+    };
+    let level = run("level", &["--set", "terrain.radial=[[0.0,0.0],[0.2,0.0]]"]);
+    let cone = run("cone", &["--set", "terrain.radial=[[0.0,0.05],[0.2,0.0]]"]);
+    let [level, down] = [&level, &cone].map(|found| value(found, "r_front"));
+    assert!(down > 1.02 * level, "{down} {level}");
+    assert!(value(&cone, "volume_error").abs() < 1e-12);
+    let (header, map) = table(&folder.path().join("cone/map.csv"));
+    assert_eq!(header, ["x", "y", "z_ground", "h"]);
+    for row in map.iter().filter(|row| row[0].hypot(row[1]) < 0.18) {
+        let exact = 0.05 - 0.25 * row[0].hypot(row[1]);
+        assert!((row[2] - exact).abs() < 3e-3, "{row:?}");
+    }
+    let (header, _) = table(&folder.path().join("cone/deposit.csv"));
+    assert_eq!(header, ["r", "h", "z_ground"]);
+    let frames = vtkhdf::read_series(&folder.path().join("cone/fields.vtkhdf")).unwrap();
+    let ground = frames[0]
+        .fields
+        .iter()
+        .find(|f| f.name == "ground")
+        .unwrap();
+    let vtkhdf::Values::Counts(ground) = &ground.values else {
+        panic!("ground is not a flag")
+    };
+    assert_eq!(ground.iter().filter(|n| **n == 1).count(), 81);
+
+    let refused = |more: &[&str], words: &[&str]| {
+        let base = ["run", "cylinder-collapse", "--out", "bad"];
+        let output = colluvium(folder.path(), &[&base[..], &small, more].concat());
+        let said = String::from_utf8_lossy(&output.stderr).into_owned();
+        assert_eq!(output.status.code(), Some(2), "{said}");
+        for word in words {
+            assert!(said.contains(word), "{word}: {said}");
+        }
+        assert!(!folder.path().join("bad").exists());
+    };
+    let incline = "terrain.along_x=[[-0.3,0.1],[0.3,-0.1]]";
+    refused(&["--set", incline], &["grid.whole", "along_x"]);
+    let lone = "terrain.radial=[[0.0,0.1]]";
+    refused(&["--set", lone], &["terrain.radial", "2 points"]);
+    refused(
+        &["--set", "terrain.contact=\"coulomb\""],
+        &["terrain.along_x", "missing"],
+    );
+    let both = ["--set", incline, "--set", "terrain.heights=\"none.asc\""];
+    refused(&both, &["terrain.heights", "along_x"]);
+    let rough = [
+        "--set",
+        "terrain.radial=[[0.0,0.1],[0.2,0.0]]",
+        "--set",
+        "floor.contact=\"free-slip\"",
+    ];
+    refused(&rough, &["floor.contact"]);
+    // A raster that does not reach as far as the grid.
+    let rows = "0 0 0\n0 0 0\n0 0 0\n";
+    let raster = format!("ncols 3\nnrows 3\nxllcorner -0.1\nyllcorner -0.1\ncellsize 0.1\n{rows}");
+    std::fs::write(folder.path().join("small.asc"), raster).unwrap();
+    let file = [
+        "--set",
+        "terrain.heights=\"small.asc\"",
+        "--set",
+        "grid.whole=true",
+    ];
+    refused(&file, &["terrain.heights", "small.asc", "no ground"]);
+}

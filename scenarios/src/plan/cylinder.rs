@@ -3,11 +3,12 @@
 use super::Lines;
 use crate::run;
 use crate::scene::CylinderScene;
+use colluvium_continuum::cylinder_collapse::CylinderGround;
 
 /// Peak memory for each cell with a pressure (bytes), as measured with a thousand of them.
 const MEMORY_PER_CELL: f64 = 2.0e5;
 
-pub(super) fn cylinder(body: &CylinderScene) -> String {
+pub(super) fn cylinder(body: &CylinderScene, ground: Option<&CylinderGround>) -> String {
     let mut lines = Lines::default();
     let case = run::cylinder::case(body);
     let units = case.units();
@@ -19,11 +20,29 @@ pub(super) fn cylinder(body: &CylinderScene) -> String {
             "cylinder-collapse: a cylinder {} m high, {:.4} m in radius, on a floor ({}), in space; {} of it is computed",
             body.height,
             case.radius(),
-            run::collapse_ground::words_of(case.floor),
+            match &body.terrain {
+                Some(_) => "terrain".to_owned(),
+                None => run::collapse_ground::words_of(case.floor),
+            },
             if body.grid.whole { "the whole" } else { "a quarter" }
         ),
     );
     lines.say_rheology(&body.rheology);
+    if let Some(ground) = ground {
+        let length = body.grid.length_scaled * body.height;
+        let [low, high] = ground
+            .surface
+            .heights_over([-length; 2], [length; 2])
+            .unwrap_or_default();
+        lines.say(
+            "terrain",
+            &format!(
+                "a surface of {} triangles, {low:.4} to {high:.4} m high; it cuts the cells of the grid; {}; layers thinner than half a cell slide as blocks with the slope",
+                ground.surface.triangles().len(),
+                run::collapse_ground::words_of(ground.contact)
+            ),
+        );
+    }
     lines.say(
         "grid",
         &format!(

@@ -87,7 +87,12 @@ impl Followed<3, SPACE_COMPONENTS> for Falling<'_> {
 
     fn frame(&self) -> Frame {
         let collapse = &self.collapse;
-        space_frame(&collapse.fields(), collapse.rheology(), collapse.time())
+        space_frame(
+            &collapse.fields(),
+            &[],
+            collapse.rheology(),
+            collapse.time(),
+        )
     }
 }
 

@@ -46,6 +46,20 @@ pub fn words_of(contact: Contact) -> String {
     }
 }
 
+/// The surface of ground in a mesh file, whose unit is so many metres.
+pub(super) fn surface_of_mesh(path: &Path, unit: f64) -> Result<Surface, String> {
+    let surface = mesh_files::read_surface(path).map_err(|error| error.to_string())?;
+    let vertices = surface
+        .vertices
+        .iter()
+        .map(|v| [v.x * unit, v.y * unit, v.z * unit]);
+    let triangles = surface
+        .triangles
+        .iter()
+        .map(|t| t.map(|corner| corner as usize));
+    Surface::new(vertices.collect(), triangles.collect()).map_err(|error| error.to_string())
+}
+
 /// The line of the ground, x = 0 where a scene says that it starts.
 pub(super) fn profile(source: GroundSource) -> Result<Profile, String> {
     let said = |error: colluvium_continuum::Error| error.to_string();
@@ -69,17 +83,8 @@ pub(super) fn profile(source: GroundSource) -> Result<Profile, String> {
         }
         raster.profile(y)
     } else {
-        let surface = mesh_files::read_surface(path).map_err(|error| in_file(error.to_string()))?;
-        let unit = source.unit.unwrap_or(1.0);
-        let vertices = surface
-            .vertices
-            .iter()
-            .map(|v| [v.x * unit, v.y * unit, v.z * unit]);
-        let triangles = surface
-            .triangles
-            .iter()
-            .map(|t| t.map(|corner| corner as usize));
-        Surface::new(vertices.collect(), triangles.collect()).and_then(|surface| surface.profile(y))
+        let surface = surface_of_mesh(path, source.unit.unwrap_or(1.0)).map_err(in_file)?;
+        surface.profile(y)
     }
     .map_err(|error| in_file(format!("{file}: {error}")))?;
     let points = line.points().iter().map(|[px, z]| [px - x, *z]);

@@ -84,13 +84,18 @@ impl SurfaceFields<'_, 2, COMPONENTS> {
     }
 }
 
-/// Cells of a flow in space as hexahedra, with the fields over them. The deviatoric stress, positive in tension, has
-/// τ_zz = −τ_xx − τ_yy.
-pub(super) fn space_frame(cells: &[SpaceFields], law: &MuI, time: f64) -> Frame {
+/// Cells of a flow in space as hexahedra, with the fields over them, then those of the ground if there is any. The
+/// deviatoric stress, positive in tension, has τ_zz = −τ_xx − τ_yy.
+pub(super) fn space_frame(
+    cells: &[SpaceFields],
+    ground: &[[[f64; 3]; 8]],
+    law: &MuI,
+    time: f64,
+) -> Frame {
     let fields = SurfaceFields {
         cells,
         inertia: law.diameter * law.grain_density.sqrt(),
-        others: 0,
+        others: ground.len(),
     };
     let stresses = vec![
         fields.scalars("deviatoric_stress_xx", "Pa", &|c| deviator(c.stress)[0]),
@@ -99,12 +104,20 @@ pub(super) fn space_frame(cells: &[SpaceFields], law: &MuI, time: f64) -> Frame 
         fields.scalars("shear_stress_xz", "Pa", &|c| c.stress[3]),
         fields.scalars("shear_stress_yz", "Pa", &|c| c.stress[4]),
     ];
-    Frame {
+    let points = cells.iter().flat_map(corners);
+    let mut frame = Frame {
         time,
         cells: Cells::Hexahedra,
-        points: cells.iter().flat_map(corners).collect(),
+        points: points.chain(ground.iter().flatten().copied()).collect(),
         fields: fields.all(|velocity| velocity, stresses),
+    };
+    if !ground.is_empty() {
+        let [material, others] =
+            [(0, cells.len()), (1, ground.len())].map(|(n, count)| vec![n; count]);
+        let values = Values::Counts([material, others].concat());
+        frame.fields.push(field("ground", "1", values));
     }
+    frame
 }
 
 /// Corners of a cell: round its base, then round its top.

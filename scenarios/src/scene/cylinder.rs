@@ -1,7 +1,7 @@
 //! Keys of the collapse of a cylinder.
 
 use super::collapse::{check_rheology, out_of_range};
-use super::{CollapseSolver, FrictionLaw, RheologyKeys, SceneError, SurfaceKeys};
+use super::{CollapseSolver, FrictionLaw, ReliefKeys, RheologyKeys, SceneError, SurfaceKeys};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -32,6 +32,9 @@ pub struct CylinderScene {
     /// What holds on the floor.
     #[serde(default)]
     pub floor: SurfaceKeys,
+    /// Ground instead of a level floor.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub terrain: Option<ReliefKeys>,
     /// The grid.
     pub grid: CylinderGrid,
     /// The solver.
@@ -87,6 +90,17 @@ impl CylinderScene {
             ));
         }
         self.floor.check_together(origin, "floor")?;
+        if let Some(terrain) = &self.terrain {
+            terrain.check_together(origin, self.grid.whole)?;
+            if self.floor != SurfaceKeys::default() {
+                return Err(out_of_range(
+                    origin,
+                    "floor.contact",
+                    "given".into(),
+                    "left out over [terrain], which has a contact of its own".into(),
+                ));
+            }
+        }
         let law = self.rheology.law;
         if law != FrictionLaw::MuI {
             return Err(out_of_range(

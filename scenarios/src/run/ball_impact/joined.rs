@@ -357,7 +357,7 @@ impl Recipe for JoinedBed<'_> {
         }
         let bowl = guard.as_ref()?;
         let law = &bowl.spec().law;
-        Some(space_frame(&bowl.fields(), law, simulation.time()))
+        Some(space_frame(&bowl.fields(), &[], law, simulation.time()))
     }
 
     fn conclude(&self, ran: &mut Ran, summary: &mut Summary) -> Result<Vec<Table>, Failure> {
