@@ -4,10 +4,11 @@
 //! rings a diameter wide about the axis,
 //!
 //! ```text
-//! h(r) = Σ V_i w(r - r_i) / (2π r φ)
+//! h(r) = Σ V_i w(r - r_i) / (2π φ ∫ s w(r - s) ds)
 //! ```
 //!
-//! with the weights w of `heap.rs` and φ the solid fraction of the cylinder before.
+//! with the weights w of `heap.rs`, mirrored at the axis, and φ the solid fraction of the cylinder before: a level layer is
+//! level up to the axis. The integral is r, but for r < b = 2 d it is r + (b - r)³/(3 b²).
 
 mod beside;
 
@@ -40,6 +41,12 @@ const QUIET: Rest = Rest {
     kinetic: 1e-5,
     unbalanced: 0.03,
 };
+
+/// ∫ |s| w(r − s) ds of hats that reach over two rings so wide (m).
+fn smeared(r: f64, ring: f64) -> f64 {
+    let reach = 2.0 * ring;
+    r + (reach - r).max(0.0).powi(3) / (3.0 * reach * reach)
+}
 
 impl GrainCylinderScene {
     fn time_unit(&self) -> f64 {
@@ -85,7 +92,7 @@ impl GrainCylinderScene {
         let axis = self.rings();
         let mut heights = axis.heights(rows, part * solid_fraction);
         for (r, h) in axis.positions().into_iter().zip(&mut heights) {
-            *h /= TAU * r;
+            *h /= TAU * smeared(r, axis.spacing);
         }
         heights
     }
@@ -107,7 +114,10 @@ impl GrainCylinderScene {
         let within = TOP * self.grains.diameter;
         let places = self.rings().positions();
         let inner = places.iter().zip(heights).filter(|(r, _)| **r < within);
-        let (volume, area) = inner.fold((0.0, 0.0), |(v, a), (r, h)| (v + r * h, a + r));
+        let (volume, area) = inner.fold((0.0, 0.0), |(v, a), (r, h)| {
+            let share = smeared(*r, self.grains.diameter);
+            (v + share * h, a + share)
+        });
         volume / area
     }
 
@@ -453,5 +463,30 @@ impl GrainCylinderScene {
                 0.5 * (g.mass() * g.velocity.norm_squared() + moment * g.spin.norm_squared())
             })
             .sum()
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn a_level_layer_is_level_up_to_the_axis() {
+        let rings = HeapAxis {
+            start: 0.0,
+            spacing: 0.5,
+            columns: 12,
+            mirrored: true,
+        };
+        let step = 1e-4;
+        let layer = (0..60_000).map(|k| {
+            let r = step * (f64::from(k) + 0.5);
+            [r, TAU * r * step]
+        });
+        let heights = rings.heights(layer, 1.0);
+        for (r, h) in rings.positions().into_iter().zip(heights).take(9) {
+            let level = h / (TAU * smeared(r, rings.spacing));
+            assert!((level - 1.0).abs() < 1e-6, "{r} {level}");
+        }
     }
 }
