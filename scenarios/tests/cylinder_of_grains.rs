@@ -101,6 +101,7 @@ fn bad_cylinders_are_refused_by_key() {
             "greater than",
         ),
         ("grid.cells=65", "grid.cells", "64"),
+        ("grid.cells=10", "grid.cells", "at least 17"),
         ("grains.calibrated=sand", "grains.calibrated", "glass"),
         ("aspect=0", "aspect", "0.05"),
     ] {

@@ -42,6 +42,12 @@ pub(super) const STILL_LOOKS: f64 = 3.0;
 /// Times √(H/g) before which a column that has just been let go is not looked at for rest.
 pub(super) const BEGUN: f64 = 1.0;
 
+/// Kinetic energy of a ball, translation and rotation (J).
+pub(super) fn kinetic(g: &Grain) -> f64 {
+    let moment = 0.4 * g.mass() * g.radius * g.radius;
+    0.5 * (g.mass() * g.velocity.norm_squared() + moment * g.spin.norm_squared())
+}
+
 impl CollapseScene {
     pub(super) fn time_unit(&self) -> f64 {
         (self.height / self.gravity).sqrt()
@@ -182,6 +188,18 @@ impl CollapseScene {
         }
     }
 
+    /// Kinetic energy (J) of grains on the floor. A plane has no end; beyond terrain grains fall for ever.
+    pub(super) fn kinetic_of_the_heap(&self, simulation: &mut Simulation) -> f64 {
+        if self.terrain.is_none() {
+            return simulation.energy().kinetic();
+        }
+        let grains = simulation.grain_list();
+        let there = grains
+            .iter()
+            .filter(|g| !g.fixed && g.position.x <= self.length());
+        there.map(kinetic).sum()
+    }
+
     pub(super) fn threshold(&self) -> f64 {
         self.front_height_scaled * self.height
     }
@@ -245,6 +263,12 @@ impl Recipe for CollapseScene {
             "overlap",
         ] {
             layers::remove(&mut keys, later);
+        }
+        // Floor grains lie along the ground itself, whatever file it came from.
+        if let Ok(Some(land)) = self.land("")
+            && let Ok(points) = toml::Value::try_from(land.line().points())
+        {
+            keys.insert("terrain".into(), points);
         }
         Some(keys)
     }
@@ -384,7 +408,7 @@ impl Recipe for CollapseScene {
         self.see(simulation, &mut course, profile);
         let unit = simulation.free_mass() * self.gravity * self.grains.diameter;
         let still = simulation.time() > BEGUN * self.time_unit()
-            && simulation.energy().kinetic() < STILL * unit;
+            && self.kinetic_of_the_heap(simulation) < STILL * unit;
         course.resting = if still { course.resting + 1.0 } else { 0.0 };
         let over = course.resting >= STILL_LOOKS;
         course.write(state);

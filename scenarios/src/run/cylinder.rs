@@ -296,7 +296,15 @@ fn describe(summary: &mut Summary, falling: &Falling, course: &Course, wall_s: f
             .fold(0.0_f64, |most, x| most.max(x.abs())),
         None => along_axis.max(front),
     };
-    if farthest >= r.last().copied().unwrap_or(0.0) {
+    let end = match scene.terrain {
+        // The middle of the outermost column is the farthest that a heap can be seen.
+        Some(_) => {
+            let length = scene.grid.length_scaled * scene.height;
+            length - 0.51 * length / scene.cells() as f64
+        }
+        None => r.last().copied().unwrap_or(0.0),
+    };
+    if farthest >= end {
         summary.remarks.push(
             "The heap reached the end of the grid: grid.length_scaled is too small for its run-out."
                 .into(),

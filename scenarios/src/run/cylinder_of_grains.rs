@@ -12,7 +12,7 @@
 
 mod beside;
 
-use super::column_of_grains::{BEGUN, FLOOR, FRONTS, PROFILE_EVERY, STILL, STILL_LOOKS};
+use super::column_of_grains::{BEGUN, FLOOR, FRONTS, PROFILE_EVERY, STILL, STILL_LOOKS, kinetic};
 use super::heap::{HeapAxis, HeapCourse, edge};
 use super::world::workshop::{Surroundings, softened};
 use super::world::{Course, Expected, Ran, Recipe, Workshop, World};
@@ -457,12 +457,7 @@ impl GrainCylinderScene {
         let there = grains
             .iter()
             .filter(|g| !g.fixed && g.position.xy().norm() <= reach);
-        there
-            .map(|g| {
-                let moment = 0.4 * g.mass() * g.radius * g.radius;
-                0.5 * (g.mass() * g.velocity.norm_squared() + moment * g.spin.norm_squared())
-            })
-            .sum()
+        there.map(kinetic).sum()
     }
 }
 

@@ -298,7 +298,7 @@ impl<'a> JoinedColumn<'a> {
     /// counts as it would there, or the same heap would have to be calmer the fewer of it are grains.
     fn rests(&self, simulation: &mut Simulation, live: &mut Live) -> bool {
         let unit = live.edge.whole_mass() * self.scene.gravity * self.scene.grains.diameter;
-        let kinetic = simulation.energy().kinetic() + live.edge.continuum_kinetic();
+        let kinetic = self.scene.kinetic_of_the_heap(simulation) + live.edge.continuum_kinetic();
         let still = simulation.time() > BEGUN * self.scene.time_unit() && kinetic < STILL * unit;
         live.course.resting = if still {
             live.course.resting + 1.0

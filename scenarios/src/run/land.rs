@@ -54,12 +54,13 @@ impl Land {
         &self.line
     }
 
-    /// Height at x (m); 0 before 0 and on a plane.
+    /// Height at x (m); 0 before 0 and on a plane, that of its end beyond it.
     pub fn height(land: Option<&Land>, x: f64) -> f64 {
-        match land {
-            Some(land) if x > 0.0 => land.line.height_at(x).unwrap_or(0.0),
-            _ => 0.0,
-        }
+        let Some(land) = land.filter(|_| x > 0.0) else {
+            return 0.0;
+        };
+        let last = land.line.points().last().map_or(0.0, |p| p[1]);
+        land.line.height_at(x).unwrap_or(last)
     }
 
     /// Heights of the lowest and the highest ground (m), 0 among them.
@@ -138,7 +139,13 @@ mod tests {
     fn heights_count_from_zero() {
         // From a step at 0, and from within a slope.
         let step = land(&[[-1.0, 7.0], [0.0, 7.0], [0.0, 4.0], [6.0, 4.0], [12.0, 1.0]]).unwrap();
-        for (x, z) in [(-2.0, 0.0), (3.0, 0.0), (9.0, -1.5), (14.0, -3.0)] {
+        for (x, z) in [
+            (-2.0, 0.0),
+            (3.0, 0.0),
+            (9.0, -1.5),
+            (14.0, -3.0),
+            (99.0, -3.0),
+        ] {
             assert_eq!(Land::height(Some(&step), x), z, "{x}");
         }
         assert_eq!(step.level_up_to(), 6.0);

@@ -242,6 +242,10 @@ impl BallImpactScene {
                 "given with zones.moving = true: a box that stays has no other number of grains";
             return Err(at("zones").refuse("budget", budget, range));
         }
+        if let (Some(near), false) = (zones.near_diameters, zones.moving) {
+            let range = "given with zones.moving = true: a box that stays is never too near";
+            return Err(at("zones").refuse("near_diameters", near, range));
+        }
         if zones.wake_speed_scaled <= zones.rest_speed_scaled {
             let range = format!(
                 "above zones.rest_speed_scaled = {}",

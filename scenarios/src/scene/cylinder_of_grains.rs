@@ -79,6 +79,8 @@ pub struct GrainCylinderGrid {
 
 /// Fewest grains across the cylinder's height or radius.
 const FEWEST_GRAINS: f64 = 4.0;
+/// Fewest cells of the coarser grid across them: the continuum needs 3, of a cylinder that has settled a little lower.
+const FEWEST_CELLS: f64 = 3.5;
 
 impl GrainCylinderScene {
     /// Radius of the cylinder (m).
@@ -89,6 +91,11 @@ impl GrainCylinderScene {
     /// Radius of the floor (m).
     pub fn length(&self) -> f64 {
         self.grid.length_scaled * self.height
+    }
+
+    /// Cells from the axis to the edge of a coarser grid, which tells what the grid does.
+    pub fn coarse_cells(&self) -> u64 {
+        (2 * self.grid.cells / 3).max(8)
     }
 
     /// The contact law, with the stiffness that the scene gives in scaled form.
@@ -125,6 +132,16 @@ impl GrainCylinderScene {
                 1.0 / self.aspect
             );
             return Err(at("grid").refuse("length_scaled", self.grid.length_scaled, range));
+        }
+        let across = self.coarse_cells() as f64 / self.grid.length_scaled / self.aspect.max(1.0);
+        if self.grains.calibrated.word().is_some() && across < FEWEST_CELLS {
+            let least = 1.5 * FEWEST_CELLS * self.grid.length_scaled * self.aspect.max(1.0);
+            let range = format!(
+                "at least {:.0}, for {FEWEST_CELLS} cells of a grid of two thirds of them up the height and along the radius; \
+                 or grains.calibrated = \"none\"",
+                least.ceil() + 1.0
+            );
+            return Err(at("grid").refuse("cells", self.grid.cells, range));
         }
         self.grain_materials(origin).map(drop)
     }

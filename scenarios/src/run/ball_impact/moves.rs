@@ -35,7 +35,7 @@ pub(super) fn table(bowl: &Bowl, summary: &mut Summary) -> Option<Table> {
     ));
     if bowl.refused_moves() > 0.0 {
         summary.remarks.push(format!(
-            "{} moves outwards were refused: zones.budget is too small for what the box needs, or it would have filled the container.",
+            "At {} exchanges a move outwards was refused: zones.budget is too small for what the box needs, or it would have filled the container.",
             bowl.refused_moves()
         ));
     }
@@ -48,7 +48,7 @@ pub(super) fn table(bowl: &Bowl, summary: &mut Summary) -> Option<Table> {
         (
             "refused_moves",
             bowl.refused_moves(),
-            "that zones.budget or the walls did not allow",
+            "exchanges at which zones.budget or the walls did not allow a side's move",
         ),
         (
             "displaced",

@@ -14,7 +14,6 @@ use super::runout::{Runout, nothing_yet};
 use super::watch::EDGE;
 use super::{STILL, STILL_LOOKS, bonds_that_survive, comet};
 use crate::failure::Failure;
-use crate::run::land::Land;
 use crate::run::world::boulders::boulders;
 use crate::run::world::{Course, Expected, Ran, Recipe, as_the_scene, fragments};
 use crate::scene::CliffScene;
@@ -95,27 +94,25 @@ impl<'a> JoinedCliff<'a> {
     }
 
     /// Whether the grains are to become continuum now.
-    fn is_due(&self, record: &CliffRecord, simulation: &mut Simulation) -> Result<bool, Failure> {
+    fn is_due(&self, record: &CliffRecord, simulation: &mut Simulation) -> bool {
         let [peak, when] = record.times.peak;
         let kinetic = simulation.energy().kinetic();
         let calm = !record.times.failed.is_nan()
             && simulation.time() > when
             && kinetic <= self.scene.runout.kinetic_share * peak;
-        Ok(calm && self.lies(record, simulation)?)
+        calm && self.lies(record, simulation)
     }
 
-    /// Whether the debris lies rather than stands.
-    fn lies(&self, record: &CliffRecord, simulation: &mut Simulation) -> Result<bool, Failure> {
+    /// Whether the debris lies rather than stands, by its thickness alone: on a steep slope what lies is no pillar.
+    fn lies(&self, record: &CliffRecord, simulation: &mut Simulation) -> bool {
         let Some(d) = self.scene.diameter() else {
-            return Ok(false);
+            return false;
         };
         let axis = self.scene.heap_axis(d);
         let base = record.heap.solid_fraction * simulation.domain().lengths().y;
         let heights = self.scene.heights(&simulation.grain_list(), &axis, base);
-        let land = self.scene.land(&self.origin)?;
-        let ground = |x: f64| Land::height(land.as_ref(), x);
-        let pile = Pile::of([&axis.positions(), &heights], 0.0, EDGE * d, ground);
-        Ok(pile.is_none_or(|p| p.wedge_degrees() <= self.scene.runout.steepest_degrees))
+        let pile = Pile::of([&axis.positions(), &heights], 0.0, EDGE * d, |_| 0.0);
+        pile.is_none_or(|p| p.wedge_degrees() <= self.scene.runout.steepest_degrees)
     }
 
     /// Makes continuum of what lay before the crack or has come before it, and holds the rest.
@@ -269,7 +266,7 @@ impl Recipe for JoinedCliff<'_> {
             .diameter()
             .and_then(|d| CliffRecord::read(&memory, columns(d)))
             .ok_or_else(damaged)?;
-        if course == Course::On && self.is_due(&record, simulation)? {
+        if course == Course::On && self.is_due(&record, simulation) {
             *guard = Some(self.hand_over(&record, simulation)?);
         }
         Self::remember(&memory, guard.as_ref(), state);

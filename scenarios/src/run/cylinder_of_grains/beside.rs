@@ -34,11 +34,6 @@ struct Outcome {
 }
 
 impl GrainCylinderScene {
-    /// Cells of a coarser grid, which tells what the grid does.
-    pub(super) fn coarse_cells(&self) -> u64 {
-        (2 * self.grid.cells / 3).max(8)
-    }
-
     fn outcome(&self, law: MuI, height: f64, cells: u64) -> Result<Option<Outcome>, Failure> {
         let case = CylinderCase {
             aspect: height / self.radius(),
@@ -130,7 +125,10 @@ impl GrainCylinderScene {
             let (r, h) = &outcome.deposit;
             (edge(r, h, self.threshold()) - radius) / radius
         };
-        let top = whole.deposit.1.iter().copied().fold(0.0, f64::max);
+        let (r, h) = &whole.deposit;
+        let within = super::TOP * self.grains.diameter;
+        let inner = r.iter().zip(h).filter(|(r, _)| **r < within);
+        let (volume, area) = inner.fold((0.0, 0.0), |(v, a), (r, h)| (v + r * h, a + r));
         let mut put = |name: &str, value: f64, unit: &str, source: String| {
             summary.put(name, Quantity::new(value, unit).from(&source));
         };
@@ -142,9 +140,9 @@ impl GrainCylinderScene {
         );
         put(
             "continuum_deposit_height",
-            top,
+            if area > 0.0 { volume / area } else { h[0] },
             "m",
-            "greatest height of its deposit".into(),
+            "mean height of its deposit within 3 d of the axis".into(),
         );
         put(
             "runout_difference",
