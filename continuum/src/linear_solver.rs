@@ -25,6 +25,7 @@ mod ldlt;
 mod lu;
 mod multigrid;
 mod pattern;
+mod product;
 mod substitution;
 
 use faer::sparse::SymbolicSparseColMat;
@@ -37,14 +38,15 @@ use ldlt::QuasiDefinite;
 use lu::Lu;
 use multigrid::Multigrid;
 pub use pattern::Blocks;
+use product::Product;
 
 /// Relative residual from which on factors in single precision are enough.
 pub(crate) const LOOSE: f64 = 1e-6;
 
 /// Factors of earlier coefficients are kept as long as a solution takes no more directions than this.
-const KEPT_UNTIL: usize = 14;
+const KEPT_UNTIL: usize = 30;
 /// Directions after which a solution with factors of earlier coefficients goes on with new ones.
-const KEPT_DIRECTIONS: usize = 20;
+const KEPT_DIRECTIONS: usize = 30;
 
 /// How systems are solved.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -67,6 +69,8 @@ pub struct Krylov {
     pub regularisation: f64,
     /// Least residual at which GMRES is to end, relative to the right-hand side.
     pub tolerance: f64,
+    /// How much more the rows of the other block count in the residual than those of K.
+    pub weight: f64,
 }
 
 /// A square sparse matrix of fixed pattern with its factors.
@@ -84,6 +88,7 @@ pub struct SparseSystem {
 /// The iteration and its preconditioners.
 struct Iterative {
     gmres: Gmres,
+    product: Product,
     multigrid: Option<Multigrid>,
     /// With multigrid these are made when it stalls.
     factors: Option<QuasiDefinite>,
@@ -172,6 +177,7 @@ impl SparseSystem {
         };
         let mut iterative = Iterative {
             gmres: Gmres::new(size),
+            product: Product::new(&system.pattern, krylov.definite),
             multigrid,
             factors: None,
             krylov,
@@ -251,11 +257,11 @@ impl SparseSystem {
 
     /// GMRES with the present preconditioner; says whether it came to its end.
     fn iterate(&mut self, right_hand_side: &[f64], solution: &mut [f64], goal: Goal) -> bool {
-        let (pattern, values) = (&self.pattern, &self.values);
-        let multiply = |x: &[f64], y: &mut [f64]| multiply(pattern, values, x, y);
         let Some(iterative) = &mut self.iterative else {
             return false;
         };
+        let product = &iterative.product;
+        let multiply = |x: &[f64], y: &mut [f64]| product.multiply(x, y);
         let gmres = &mut iterative.gmres;
         match (self.state, &mut iterative.multigrid, &mut iterative.factors) {
             (Factors::Multigrid, Some(multigrid), _) => {
@@ -281,6 +287,11 @@ impl SparseSystem {
         tolerance: f64,
     ) -> Result<(), Error> {
         let mut goal = Goal::full(tolerance);
+        if let Some(iterative) = &mut self.iterative {
+            goal.weighted_from = iterative.krylov.definite;
+            goal.weight = iterative.krylov.weight;
+            iterative.product.load(&self.values);
+        }
         if self.state == Factors::Multigrid {
             if self.iterate(right_hand_side, solution, goal) {
                 return Ok(());
@@ -364,6 +375,7 @@ mod tests {
         definite: 2,
         regularisation: 1e-6,
         tolerance: 1e-10,
+        weight: 1.0,
     };
     const METHODS: [(Method, f64); 3] = [
         (Method::Direct, 1e-14),

@@ -25,7 +25,7 @@ pub use table::{FrictionTable, Grains};
 pub use well_posedness::well_posedness;
 
 /// Shear stress that the material bears at a strain rate and a pressure, with its derivatives.
-#[derive(Debug, Clone, Copy, PartialEq)]
+#[derive(Debug, Clone, Copy, PartialEq, Default)]
 pub struct Threshold {
     /// κ(γ̇, p) (Pa).
     pub stress: f64,

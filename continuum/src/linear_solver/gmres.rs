@@ -5,14 +5,20 @@
 const DIRECTIONS: usize = 40;
 /// Restarts before the iteration is given up.
 const CYCLES: usize = 3;
+/// Weighted rows are asked for no smaller residual than this part of their right-hand side.
+const LEAST_REDUCTION: f64 = 1e-9;
 
 /// What a solution has to reach, and from where.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(super) struct Goal {
-    /// Residual relative to the right-hand side.
+    /// Residual, with weights, relative to the right-hand side.
     pub tolerance: f64,
     /// Most directions of the Krylov space before the iteration is given up.
     pub directions: usize,
+    /// Rows from this number on
+    pub weighted_from: usize,
+    /// count by so much in the residual.
+    pub weight: f64,
     /// Whether to start from the solution as it is given, not from zero.
     pub goes_on: bool,
 }
@@ -23,8 +29,24 @@ impl Goal {
         Self {
             tolerance,
             directions: DIRECTIONS * CYCLES,
+            weighted_from: usize::MAX,
+            weight: 1.0,
             goes_on: false,
         }
+    }
+
+    /// Multiplies the weighted rows by a factor.
+    fn scale(&self, r: &mut [f64], factor: f64) {
+        let rows = r.iter_mut().skip(self.weighted_from);
+        rows.for_each(|r| *r *= factor);
+    }
+
+    /// Size of the weighted residual at which the iteration ends: so much of the right-hand side without weights, but
+    /// never less of the weighted rows than round-off leaves.
+    fn target(&self, b: &[f64]) -> f64 {
+        let weighted = &b[self.weighted_from.min(b.len())..];
+        let least = LEAST_REDUCTION * self.weight * dot(weighted, weighted).sqrt();
+        (self.tolerance * dot(b, b).sqrt()).max(least)
     }
 }
 
@@ -88,7 +110,7 @@ impl Gmres {
         x: &mut [f64],
         goal: Goal,
     ) -> bool {
-        let target = goal.tolerance * dot(b, b).sqrt();
+        let target = goal.target(b);
         self.iterations = 0;
         let mut is_zero = !goal.goes_on;
         if is_zero {
@@ -103,6 +125,7 @@ impl Gmres {
                     *v = b - w;
                 }
             }
+            goal.scale(&mut self.basis[0], goal.weight);
             let size = dot(&self.basis[0], &self.basis[0]).sqrt();
             // Written so that a NaN counts as failure.
             if size <= target {
@@ -117,7 +140,7 @@ impl Gmres {
             self.reduced[0] = size;
             let mut used = 0;
             while used < left.min(DIRECTIONS) && self.reduced[used].abs() > 0.5 * target {
-                self.extend(used, &multiply, &mut precondition);
+                self.extend(used, &multiply, &mut precondition, goal);
                 used += 1;
             }
             if used == 0 {
@@ -135,6 +158,7 @@ impl Gmres {
         k: usize,
         multiply: &impl Fn(&[f64], &mut [f64]),
         precondition: &mut impl FnMut(&mut [f64]),
+        goal: Goal,
     ) {
         // Few iterations need many directions.
         if self.basis.len() == k + 1 {
@@ -145,10 +169,12 @@ impl Gmres {
         }
         let direction = &mut self.directions[k];
         direction.copy_from_slice(&self.basis[k]);
+        goal.scale(direction, 1.0 / goal.weight);
         precondition(direction);
         let (known, next) = self.basis.split_at_mut(k + 1);
         let next = &mut next[0];
         multiply(direction, next);
+        goal.scale(next, goal.weight);
         let column = &mut self.triangle[k];
         for (h, v) in column.iter_mut().zip(known.iter()) {
             *h = dot(next, v);
@@ -221,5 +247,40 @@ mod tests {
         for (x, expected) in x.iter().zip([1.0, 2.0, 3.0]) {
             assert!((x - expected).abs() < 1e-9);
         }
+    }
+
+    /// Weighted rows are met more closely than the others, at the same sum of both.
+    #[test]
+    fn weighted_rows_are_met_more_closely() {
+        let a = [
+            [4.0, 1.0, 0.3, 1.0],
+            [-1.0, 3.0, 0.5, 0.2],
+            [0.0, 2.0, 5.0, 0.7],
+            [1.0, 0.4, 0.1, 2.0],
+        ];
+        let b = [6.0, 6.5, 19.0, 3.0];
+        let left = |goal: Goal| {
+            let multiply = |x: &[f64], y: &mut [f64]| {
+                for (y, row) in y.iter_mut().zip(&a) {
+                    *y = dot(row, x);
+                }
+            };
+            let mut x = [0.0; 4];
+            assert!(Gmres::new(4).solve(multiply, |_| {}, &b, &mut x, goal));
+            let mut y = [0.0; 4];
+            multiply(&x, &mut y);
+            std::array::from_fn::<f64, 4, _>(|n| (y[n] - b[n]).abs())
+        };
+        let plain = Goal::full(0.1);
+        let weighted = Goal {
+            weighted_from: 3,
+            weight: 1e4,
+            ..plain
+        };
+        let (plain, weighted) = (left(plain), left(weighted));
+        assert!(
+            weighted[3] < 1e-3 && plain[3] > 1e-2,
+            "{plain:?} {weighted:?}"
+        );
     }
 }

@@ -39,6 +39,10 @@ pub(super) struct QuasiDefinite {
     work: Vec<f64>,
 }
 
+/// Supernodes are merged up to so many columns while zeros are less than this part of them. Substitution reads zeros,
+/// too: with faer's own choice factors of plane flows are a tenth larger.
+const MERGED: [(usize, f64); 3] = [(4, 0.5), (16, 0.2), (48, 0.05)];
+
 /// Pivots smaller than this, or of the wrong sign by round-off, are replaced by it.
 const SMALLEST_PIVOT: f64 = 1e-14;
 
@@ -68,6 +72,7 @@ impl QuasiDefinite {
         if loose {
             // Small fill must not lead to factors entry by entry, which take twice the time of a step.
             parameters.supernodal_flop_ratio_threshold = SupernodalThreshold::FORCE_SUPERNODAL;
+            parameters.supernodal_params.relax = Some(&MERGED);
         }
         let symbolic = factorize_symbolic_cholesky(pattern, Side::Lower, ordering, parameters)
             .map_err(|e| Error::LinearSolver(format!("{e:?}")))?;

@@ -75,6 +75,13 @@ fn substitute_plainly(
         let pattern = symbolic.supernode(s).pattern();
         let block = &values[places[s]..places[s + 1]];
         let rows = columns + pattern.len();
+        if columns == 1 {
+            let value = x[begins[s]];
+            for (&row, l) in pattern.iter().zip(&block[1..]) {
+                x[row] -= f64::from(*l) * value;
+            }
+            continue;
+        }
         let top = &mut x[begins[s]..ends[s]];
         work.clear();
         work.resize(pattern.len(), 0.0);
@@ -97,6 +104,12 @@ fn substitute_plainly(
         let pattern = symbolic.supernode(s).pattern();
         let block = &values[places[s]..places[s + 1]];
         let rows = columns + pattern.len();
+        if columns == 1 {
+            let outer = pattern.iter().zip(&block[1..]);
+            let outer: f64 = outer.map(|(&row, l)| f64::from(*l) * x[row]).sum();
+            x[begins[s]] = x[begins[s]] / f64::from(block[0]) - outer;
+            continue;
+        }
         work.clear();
         work.extend(pattern.iter().map(|&row| x[row]));
         let top = &mut x[begins[s]..ends[s]];

@@ -13,6 +13,7 @@
 //! their pressure keep the pressure that the step began with: friction is then given, and the step has a
 //! solution. [`StepReport::held_points`] counts them.
 
+mod evaluation;
 mod part;
 
 use serde::{Deserialize, Serialize};
@@ -23,9 +24,11 @@ use super::{
     FlowState, Residuals, StepProblem, StepReport, YieldSolver, divergence_residual,
     largest_or_nan, momentum_residual,
 };
-use crate::discretisation::{COMPONENTS, Discretisation, QuadraturePoint};
+use crate::discretisation::{COMPONENTS, Discretisation};
 use crate::error::Error;
 use crate::rheology::{Rheology, squared_norm, strain_rate_norm};
+use evaluation::Evaluation;
+use part::Outcome;
 
 /// Settings of [`PrimalDual`]; times and lengths in natural units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -109,6 +112,9 @@ const FORCING: f64 = 0.3;
 /// Loosest residual of a linear system over [`PrimalDualOptions::linear_tolerance`].
 const LOOSEST: f64 = 50.0;
 
+/// Most parts that are solved between two iterations of the whole: what is left of one lies beside it.
+const MOST_PARTS: usize = 4;
+
 /// The law linearised at one quadrature point.
 #[derive(Debug, Clone, Copy)]
 struct LinearisedPoint<const C: usize> {
@@ -157,6 +163,10 @@ pub struct PrimalDual<const C: usize = COMPONENTS> {
     candidate_pressure: Vec<f64>,
     /// Residual of the stress law at each point.
     misses: Vec<f64>,
+    /// Strain rate and threshold of the trial state at each point,
+    evaluations: Vec<Evaluation<C>>,
+    /// at this ε; NaN if the state has changed since.
+    evaluated_at: f64,
 }
 
 impl<const C: usize> PrimalDual<C> {
@@ -209,6 +219,8 @@ impl<const C: usize> PrimalDual<C> {
             candidate: vec![0.0; velocities],
             candidate_pressure: vec![0.0; cells],
             misses: vec![0.0; discretisation.points().len()],
+            evaluations: vec![Evaluation::default(); discretisation.points().len()],
+            evaluated_at: f64::NAN,
         })
     }
 
@@ -225,17 +237,20 @@ impl<const C: usize> PrimalDual<C> {
     ) {
         self.trial.clone_from(start);
         self.conflicts.begin();
+        self.evaluated_at = f64::NAN;
         self.cut.fill(false);
         let mut floor = strategy.first_floor;
         // In space mirrored flows are to stay alike, to which loose systems and choices do not contribute.
         let keeps = D == 2;
-        let mut solves_parts = strategy.solves_parts
+        let solves_parts = strategy.solves_parts
             && keeps
             && problem.discretisation.places().is_some()
             && self.conflicts.held() == 0;
         // Floor with which the factors were made. Those of an earlier step would not be there after a restart.
         let mut floor_of_factors = f64::NAN;
         let mut tolerance = self.options.linear_tolerance;
+        // Points whose law was missed when a part could not be solved: there is hope again when they are fewer.
+        let mut in_vain = usize::MAX;
         for iteration in 0..strategy.max_iterations {
             self.release(problem.discretisation, iteration == 0);
             self.linearise(problem, floor);
@@ -263,10 +278,29 @@ impl<const C: usize> PrimalDual<C> {
             report.residuals = self.residuals(problem, u_old, floor);
             let is_last_floor = floor <= self.options.strain_rate_floor;
             let mut allowed = given.copied().unwrap_or_else(|| self.tolerances(problem));
-            if is_last_floor && solves_parts && !report.residuals.are_within(&allowed) {
-                solves_parts = self.solve_part(problem, u_old, &allowed, report);
+            for _ in 0..MOST_PARTS {
+                let before = report.residuals;
+                if !is_last_floor || !solves_parts || before.are_within(&allowed) {
+                    break;
+                }
+                let misses = self.misses.iter();
+                let missed = misses.filter(|miss| **miss > allowed.stress).count();
+                if 2 * missed > in_vain {
+                    break;
+                }
+                let outcome = self.solve_part(problem, u_old, &allowed, report);
+                if outcome == Outcome::TooLarge {
+                    break;
+                }
+                if outcome == Outcome::Failed {
+                    in_vain = missed;
+                }
+                self.evaluated_at = f64::NAN;
                 report.residuals = self.residuals(problem, u_old, floor);
                 allowed = given.copied().unwrap_or_else(|| self.tolerances(problem));
+                if report.residuals.over(&allowed) > 0.5 * before.over(&allowed) {
+                    break;
+                }
             }
             if keeps {
                 tolerance = self.forcing(&allowed, &report.residuals);
@@ -287,7 +321,7 @@ impl<const C: usize> PrimalDual<C> {
     /// Relative residual to which the next linear system is solved: a part of what is left of the way, by which the
     /// iteration loses nothing (Eisenstat & Walker, *SIAM J. Sci. Comput.* 17 (1996) 16).
     fn forcing(&self, allowed: &Residuals, found: &Residuals) -> f64 {
-        let left = (allowed.momentum / found.momentum).min(allowed.stress / found.stress);
+        let left = 1.0 / found.over(allowed);
         let least = self.options.linear_tolerance;
         (FORCING * left).max(least).min(LOOSEST * least)
     }
@@ -298,14 +332,16 @@ impl<const C: usize> PrimalDual<C> {
         problem: &StepProblem<'_, R, D, C, V>,
         floor: f64,
     ) {
-        let points = problem.discretisation.points();
-        let trial = &self.trial;
-        let linear = self.points.iter_mut().zip(&trial.s);
-        for (q, (point, (linear, s))) in points.iter().zip(linear).enumerate() {
-            let pressure = self.conflicts.pressure(q, point, &trial.p);
-            self.conflicts.note_point(q, pressure.1);
-            let (gamma, rate, threshold) =
-                evaluate(problem.rheology, point, &trial.u, pressure, floor);
+        self.evaluate(problem, floor);
+        let states = self.evaluations.iter().zip(&self.trial.s);
+        for (q, (linear, (evaluation, s))) in self.points.iter_mut().zip(states).enumerate() {
+            let Evaluation {
+                gamma,
+                rate,
+                threshold,
+                is_pressed,
+            } = *evaluation;
+            self.conflicts.note_point(q, is_pressed);
             let viscosity = threshold.stress / rate;
             let inverse_square = 1.0 / (rate * rate);
             for a in 0..C {
@@ -456,10 +492,10 @@ impl<const C: usize> PrimalDual<C> {
                 *p = p.max(0.0);
             }
         }
-        for (q, (point, s)) in points.iter().zip(&mut self.trial.s).enumerate() {
-            let pressure = self.conflicts.pressure(q, point, &self.trial.p);
-            let (_, _, threshold) =
-                evaluate(problem.rheology, point, &self.trial.u, pressure, floor);
+        self.evaluated_at = f64::NAN;
+        self.evaluate(problem, floor);
+        for (evaluation, s) in self.evaluations.iter().zip(&mut self.trial.s) {
+            let threshold = evaluation.threshold;
             let size = strain_rate_norm(*s);
             if size > threshold.stress {
                 let shrink = threshold.stress / size;
@@ -476,13 +512,17 @@ impl<const C: usize> PrimalDual<C> {
         floor: f64,
     ) -> Residuals {
         let divergence = self.continuity_residual(problem.discretisation);
+        self.evaluate(problem, floor);
         let momentum = &mut self.right_hand_side[..self.trial.u.len()];
         let mut stress = 0.0;
-        let points = problem.discretisation.points().iter().zip(&self.trial.s);
-        for (q, ((point, s), kept)) in points.zip(&mut self.misses).enumerate() {
-            let pressure = self.conflicts.pressure(q, point, &self.trial.p);
-            let (gamma, rate, threshold) =
-                evaluate(problem.rheology, point, &self.trial.u, pressure, floor);
+        let states = self.evaluations.iter().zip(&self.trial.s);
+        for ((evaluation, s), kept) in states.zip(&mut self.misses) {
+            let Evaluation {
+                gamma,
+                rate,
+                threshold,
+                ..
+            } = *evaluation;
             let miss: [f64; C] = std::array::from_fn(|a| s[a] * rate - threshold.stress * gamma[a]);
             let scale = rate * (threshold.stress + 1e-3);
             *kept = strain_rate_norm(miss) / scale;
@@ -542,31 +582,17 @@ impl<const C: usize> PrimalDual<C> {
 }
 
 impl Residuals {
+    /// The larger of momentum and stress over what is allowed.
+    fn over(&self, allowed: &Self) -> f64 {
+        (self.momentum / allowed.momentum).max(self.stress / allowed.stress)
+    }
+
     /// Whether none is larger than allowed.
     fn are_within(&self, allowed: &Self) -> bool {
         self.momentum <= allowed.momentum
             && self.divergence <= allowed.divergence
             && self.stress <= allowed.stress
     }
-}
-
-/// γ, γ_ε = √(|γ|² + ε²) and the threshold at a point under a pressure, of which is said whether it
-/// depends on the cells'.
-#[inline]
-fn evaluate<R: Rheology, const C: usize, const V: usize>(
-    rheology: &R,
-    point: &QuadraturePoint<C, V>,
-    u: &[f64],
-    (pressure, depends): (f64, bool),
-    floor: f64,
-) -> ([f64; C], f64, crate::rheology::Threshold) {
-    let gamma = point.strain_rate(u);
-    let rate = (squared_norm(&gamma) + floor * floor).sqrt();
-    let mut threshold = point.law.threshold(rheology, rate, pressure);
-    if !depends {
-        threshold.by_pressure = 0.0;
-    }
-    (gamma, rate, threshold)
 }
 
 /// J(u) = ½ (u − u*)ᵀ M (u − u*)/Δt + Σ W Ψ(γ_ε, p) − F·u: convex in u, least at the solution of

@@ -24,8 +24,19 @@ const LARGEST_PART: f64 = 0.3;
 const AIM: f64 = 0.3;
 /// or over what they are before.
 const GAIN: f64 = 3e-3;
-/// Iterations on a part before it is given up.
-const MOST_ITERATIONS: usize = 12;
+/// Iterations on a part before it is tried from a larger ε, and those from there before it is given up.
+const MOST_ITERATIONS: [usize; 2] = [12, 20];
+
+/// How an attempt at a part ended.
+#[derive(Debug, Clone, Copy, PartialEq, Eq)]
+pub(super) enum Outcome {
+    /// What is left lies in too many places.
+    TooLarge,
+    /// The part is solved.
+    Solved,
+    /// Newton's method did not come to its end.
+    Failed,
+}
 
 /// Numbers of the unknowns and points of a part in the whole.
 pub(super) struct Part {
@@ -160,15 +171,14 @@ impl Part {
 }
 
 impl<const C: usize> PrimalDual<C> {
-    /// Newton's method on the unknowns where most of the residuals is left, if these are few; says whether it is worth
-    /// while to go on like this. The right-hand side holds the residual of momentum.
+    /// Newton's method on the unknowns where most of the residuals is left, if these are few. The right-hand side holds the residual of momentum.
     pub(super) fn solve_part<R: Rheology, const D: usize, const V: usize>(
         &mut self,
         problem: &StepProblem<'_, R, D, C, V>,
         u_old: &[f64],
         allowed: &Residuals,
         report: &mut StepReport,
-    ) -> bool {
+    ) -> Outcome {
         let discretisation = problem.discretisation;
         let found = report.residuals;
         let off = (SHARE_OF_MOMENTUM * found.momentum).max(SHARE_ALLOWED * allowed.momentum);
@@ -182,11 +192,11 @@ impl<const C: usize> PrimalDual<C> {
         }
         let most = (LARGEST_PART * u_old.len() as f64) as usize;
         let Some(part) = Part::around(discretisation, &mut marked, LAYERS, most) else {
-            return true;
+            return Outcome::TooLarge;
         };
         let (restricted, load) = part.restrict(problem, &self.trial);
         let Ok(mut solver) = PrimalDual::new(&restricted, self.options) else {
-            return false;
+            return Outcome::Failed;
         };
         let inner = StepProblem {
             discretisation: &restricted,
@@ -196,32 +206,37 @@ impl<const C: usize> PrimalDual<C> {
         };
         let old: Vec<f64> = part.velocities.iter().map(|&j| u_old[j]).collect();
         let start = part.gather(&self.trial);
-        let strategy = Strategy {
-            first_floor: self.options.strain_rate_floor,
-            factor: self.options.floor_factor,
-            max_iterations: MOST_ITERATIONS,
-            line_search: false,
-            solves_parts: false,
-        };
+        let floors = [
+            self.options.strain_rate_floor,
+            self.options.first_strain_rate_floor,
+        ];
         let aim = Residuals {
             momentum: (AIM * allowed.momentum).max(GAIN * found.momentum),
             stress: (AIM * allowed.stress).max(GAIN * found.stress),
             ..*allowed
         };
         let mut inner_report = StepReport::default();
-        solver.attempt(
-            &inner,
-            &old,
-            &start,
-            &strategy,
-            Some(&aim),
-            &mut inner_report,
-        );
+        for (first_floor, max_iterations) in floors.into_iter().zip(MOST_ITERATIONS) {
+            let strategy = Strategy {
+                first_floor,
+                factor: self.options.floor_factor,
+                max_iterations,
+                line_search: false,
+                solves_parts: false,
+            };
+            let aim = Some(&aim);
+            solver.attempt(&inner, &old, &start, &strategy, aim, &mut inner_report);
+            if inner_report.converged {
+                break;
+            }
+        }
         report.part_iterations += inner_report.iterations;
         if inner_report.converged {
             part.scatter(&solver.trial, &mut self.trial);
+            Outcome::Solved
+        } else {
+            Outcome::Failed
         }
-        inner_report.converged
     }
 }
 
