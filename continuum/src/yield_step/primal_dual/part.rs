@@ -171,7 +171,8 @@ impl Part {
 }
 
 impl<const C: usize> PrimalDual<C> {
-    /// Newton's method on the unknowns where most of the residuals is left, if these are few. The right-hand side holds the residual of momentum.
+    /// Newton's method on the unknowns where most of the residuals is left, if these are few. The right-hand side holds the
+    /// residual of momentum.
     pub(super) fn solve_part<R: Rheology, const D: usize, const V: usize>(
         &mut self,
         problem: &StepProblem<'_, R, D, C, V>,
