@@ -194,7 +194,11 @@ impl<const D: usize> Faces<D> {
         }
         let base = topology.face_neighbours[component][face][last][0];
         let is_active = |cell: usize| cell != NONE && self.pressure[cell] != NONE;
-        if base != NONE && topology.face_cells[component][base].into_iter().all(is_active) {
+        if base != NONE
+            && topology.face_cells[component][base]
+                .into_iter()
+                .all(is_active)
+        {
             base
         } else {
             NONE

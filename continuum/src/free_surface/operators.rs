@@ -271,9 +271,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             }
             let mut point = QuadraturePoint::new(volume * self.grid.cell_volume());
             let part = self.part_beside_wall(at);
-            let stretched = layer
-                .as_ref()
-                .map_or(part, |layer| part * layer.stretched);
+            let stretched = layer.as_ref().map_or(part, |layer| part * layer.stretched);
             for axis in 0..D {
                 for &(row, orientation) in stretching::<D>(axis) {
                     self.add_stretching(cell, axis, row, stretched * orientation, &mut point);
