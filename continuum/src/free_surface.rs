@@ -14,6 +14,7 @@ mod fields;
 mod flow;
 mod fraction;
 mod ground;
+mod layers_on_material;
 mod open_ends;
 mod operators;
 mod outside;

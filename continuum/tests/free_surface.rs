@@ -215,12 +215,11 @@ fn detached_lump_falls_freely() {
     assert!(miss / total < 0.01, "{}", miss / total);
 }
 
-/// Relative L2 error of Bagnold flow (slope 0.43 rad, d = 0.04) in a box that is higher than the
-/// layer by a quarter, so that the surface lies inside a cell.
-fn bagnold_error(cells: usize) -> f64 {
-    let h = 1.25 / cells as f64;
+/// Bagnold flow (slope 0.43 rad, d = 0.04, depth 1) on cells of a given size, in a box that is higher than the layer.
+fn bagnold(cells: usize, h: f64) -> (SurfaceFlow<MuI>, impl Fn(f64) -> f64) {
     let slope = 0.43_f64;
-    let grid = Grid::with_moving_surface([Axis::Flat, bounded(1.25, cells, ROUGH, SMOOTH)]);
+    let length = h * cells as f64;
+    let grid = Grid::with_moving_surface([Axis::Flat, bounded(length, cells, ROUGH, SMOOTH)]);
     let fractions = (0..cells).map(|k| (1.0 / h - k as f64).clamp(0.0, 1.0));
     let mut options = precise(1.0);
     options.solver.strain_rate_floor = 1e-6;
@@ -236,16 +235,42 @@ fn bagnold_error(cells: usize) -> f64 {
     flow.accelerate_in_place(1e8).unwrap();
     let inertial_number = 0.4 * (slope.tan() - 0.32) / (0.60 - slope.tan());
     let surface = 2.0 / 3.0 * inertial_number / 0.04 * slope.cos().sqrt();
+    (flow, move |z: f64| surface * (1.0 - (1.0 - z).powf(1.5)))
+}
+
+/// Relative L2 error of Bagnold flow in a box that is higher than the layer by a quarter, so that the surface lies inside a
+/// cell.
+fn bagnold_error(cells: usize) -> f64 {
+    let h = 1.25 / cells as f64;
+    let (flow, exact) = bagnold(cells, h);
     let (mut miss, mut size) = (0.0, 0.0);
     for (k, u) in flow.state().velocity[0].iter().enumerate() {
         let z = (k as f64 + 0.5) * h;
         if z < 1.0 {
-            let exact = surface * (1.0 - (1.0 - z).powf(1.5));
-            miss += (u - exact).powi(2);
-            size += exact * exact;
+            miss += (u - exact(z)).powi(2);
+            size += exact(z).powi(2);
         }
     }
     (miss / size).sqrt()
+}
+
+/// A layer thinner than half a cell on top of Bagnold flow slides on it with the shear rate of its own weight, exact at the
+/// depth where it lies. Negative control: what is thinner than a tenth of a cell moves with what is below.
+#[test]
+fn layers_on_material_slide_under_their_weight() {
+    for (depth, slides) in [(0.05, false), (0.12, true), (0.3, true), (0.48, true)] {
+        let h = 1.0 / (8.0 + depth);
+        let (flow, exact) = bagnold(10, h);
+        let u = &flow.state().velocity[0];
+        let (base, near) = (8.0 * h, 1e-4 * h);
+        let rate = (exact(base + near) - exact(base - near)) / (2.0 * near);
+        let found = (u[8] - u[7]) / h / rate;
+        println!("depth {depth}: {found:.6} of the shear rate");
+        assert!(
+            (found - f64::from(u8::from(slides))).abs() < 1e-3,
+            "{depth}: {found}"
+        );
+    }
 }
 
 /// Basilisk C 25-02-26 with a sharp interface on the same grids: 1.54e-2, 6.22e-3, 3.75e-3.

@@ -85,20 +85,21 @@ fn passed_through(cells: usize, factor: f64, time: f64) -> [f64; 3] {
     [f64::sqrt(miss / size), depth, balance]
 }
 
-/// Steady Bagnold flow passes through: it stays what it is to second order, and volume is accounted for to round-off. Fed
-/// with less, the layer does not stay what it was: negative control.
+/// Steady Bagnold flow passes through: it stays what it is to 3e-4 on 8 cells in velocity and 1.5e-4 in depth, with an order of
+/// 1.5 (2.5e-3 and 8e-4, of order 2, while the layer in the uppermost cells moved with what is below), and volume is
+/// accounted for to round-off. Fed with less, the layer does not stay what it was: negative control.
 #[test]
 fn bagnold_flow_passes_through() {
     let [coarse, fine] = [8, 16].map(|cells| passed_through(cells, 1.0, 1.0));
     println!("velocity, depth, volume: {coarse:?} on 8 cells, {fine:?} on 16");
     for [velocity, depth, balance] in [coarse, fine] {
         assert!(
-            velocity < 4e-3 && depth < 2e-3 && balance < 1e-13,
+            velocity < 6e-4 && depth < 3e-4 && balance < 1e-13,
             "{velocity} {depth} {balance}"
         );
     }
     assert!(
-        fine[0] < 0.3 * coarse[0] && fine[1] < 0.3 * coarse[1],
+        fine[0] < 0.5 * coarse[0] && fine[1] < 0.5 * coarse[1],
         "{coarse:?} {fine:?}"
     );
     let starved = passed_through(8, 0.7, 1.0);

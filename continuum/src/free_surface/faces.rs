@@ -4,7 +4,8 @@
 //! face of an active cell carries an unknown velocity. What lies in less filled cells above them
 //! *follows*: such a face moves with the nearest unknown towards the material and adds its mass to
 //! it, so mass and momentum of a step are complete. Material that nothing active touches is
-//! *loose*: it flies.
+//! *loose*: it flies. In the plane a layer less than half a cell deep on material that fills its cells slides on it
+//! with a velocity of its own ([`super::layers_on_material`]).
 
 use super::operators::EMPTY;
 use super::topology::{NONE, Topology};
@@ -59,6 +60,9 @@ pub(super) const ALIKE: f64 = 1e-4;
 pub(crate) const ACTIVE: f64 = 0.5;
 /// Layers thinner than this part of a cell stick to a rough wall.
 pub(super) const THINNEST_LAYER: f64 = 1e-3;
+/// Layers on material that are thinner than this part of a cell move with it. Flow through such a cell jumps by this part
+/// of the difference of two velocities where the layer begins to slide; thinner ones cost iterations.
+const THINNEST_SLIDING: f64 = 0.1;
 
 /// Roles of cells and faces.
 #[derive(Debug, Clone)]
@@ -73,6 +77,8 @@ pub(crate) struct Faces<const D: usize = DIMENSIONS> {
     pub own: Vec<(usize, usize)>,
     /// Whether an unknown velocity belongs to a thin layer on a wall.
     pub is_thin: Vec<bool>,
+    /// The face below an unknown velocity of a layer that slides on material, or [`NONE`].
+    pub lies_on: Vec<usize>,
     /// Over ground: velocity of each face, by its own axis, and of the edges across it, by theirs, over the unknown that
     /// moves it.
     pub shares: Option<[Vec<[f64; D]>; D]>,
@@ -90,6 +96,7 @@ impl<const D: usize> Faces<D> {
             role: std::array::from_fn(|_| Vec::new()),
             own: Vec::new(),
             is_thin: Vec::new(),
+            lies_on: Vec::new(),
             shares: None,
             sliders: Vec::new(),
             acceleration,
@@ -148,6 +155,10 @@ impl<const D: usize> Faces<D> {
             if lies_on_wall(topology, fractions, component, face) {
                 return Face::Still;
             }
+            let base = self.material_under(topology, component, face);
+            if base != NONE && mass > THINNEST_SLIDING {
+                return self.take(component, face, false, base);
+            }
             let on_wall = self.wall_under(grid, topology, component, face).is_some();
             if !on_wall || mass <= MASSLESS || thin_layer == ThinLayer::Following {
                 return Face::Loose;
@@ -156,9 +167,42 @@ impl<const D: usize> Faces<D> {
                 return Face::Still;
             }
         }
+        self.take(component, face, is_thin, NONE)
+    }
+
+    /// Makes the velocity of a face an unknown.
+    pub(super) fn take(
+        &mut self,
+        component: usize,
+        face: usize,
+        is_thin: bool,
+        lies_on: usize,
+    ) -> Face {
         self.own.push((component, face));
         self.is_thin.push(is_thin);
+        self.lies_on.push(lies_on);
         Face::Own(self.own.len() - 1)
+    }
+
+    /// The face below one along the last axis, if it lies between active cells and gravity points to it rather than
+    /// along it; in the plane only.
+    fn material_under(&self, topology: &Topology<D>, component: usize, face: usize) -> usize {
+        let last = D - 1;
+        let along = self.acceleration[component].abs();
+        if D > 2 || component == last || weight_onto(&self.acceleration, last, 0) <= along {
+            return NONE;
+        }
+        let base = topology.face_neighbours[component][face][last][0];
+        let is_active = |cell: usize| cell != NONE && self.pressure[cell] != NONE;
+        if base != NONE
+            && topology.face_cells[component][base]
+                .into_iter()
+                .all(is_active)
+        {
+            base
+        } else {
+            NONE
+        }
     }
 
     /// The unknown of the nearest face that has one, the direction into the material first.

@@ -79,6 +79,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             ..Parts::default()
         };
         self.add_pressure_forces(&mut parts);
+        self.add_pressure_on_layers(&mut parts);
         self.add_thin_layers(&mut parts);
         let mut places = Vec::new();
         for (cell, &fraction) in self.fractions.iter().enumerate() {
@@ -259,18 +260,21 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             if (0..D).any(|axis| self.slides(axis, at)) {
                 self.add_sliding(cell, index, side, [filled(), share], points, places);
             }
-            let volume = match self.wall_share(at) {
-                Some(factor) => factor * share,
-                None => filled(),
+            let layer = self.under_layer(cell, at, share, filled);
+            let volume = match (&layer, self.wall_share(at)) {
+                (Some(layer), _) => layer.volume,
+                (None, Some(factor)) => factor * share,
+                (None, None) => filled(),
             };
             if volume <= 0.0 {
                 continue;
             }
             let mut point = QuadraturePoint::new(volume * self.grid.cell_volume());
             let part = self.part_beside_wall(at);
+            let stretched = layer.as_ref().map_or(part, |layer| part * layer.stretched);
             for axis in 0..D {
                 for &(row, orientation) in stretching::<D>(axis) {
-                    self.add_stretching(cell, axis, row, part * orientation, &mut point);
+                    self.add_stretching(cell, axis, row, stretched * orientation, &mut point);
                 }
             }
             if !self.add_shear_at_edge(at, &mut point) {
@@ -299,7 +303,10 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                     }
                 }
             }
-            self.add_corner_pressure(at, &mut point);
+            match &layer {
+                Some(layer) => point.pressure_offset += layer.pressure,
+                None => self.add_corner_pressure(at, &mut point),
+            }
             if !point.velocities().is_empty() {
                 let last = D - 1;
                 point.side = axes[last]
@@ -335,13 +342,17 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         if self.faces.pressure[cell] != NONE {
             point.add_pressure(self.faces.pressure[cell], 1.0);
         } else {
-            let (axis, side) =
+            let slides = |&j: &usize| self.faces.lies_on[j] != NONE;
+            let (axis, side) = if point.velocities().iter().any(slides) {
+                (D - 1, 0)
+            } else {
                 (0..D)
                     .flat_map(|axis| [(axis, 0), (axis, 1)])
                     .find(|&(axis, side)| {
                         self.topology.cell_neighbours[cell][axis][side] == NONE
                             && weight_onto(&self.acceleration, axis, side) > 0.0
-                    })?;
+                    })?
+            };
             let thickness = self.fractions[cell] * self.grid.axes()[axis].spacing();
             point.pressure_offset = 0.5 * thickness * weight_onto(&self.acceleration, axis, side);
         }
@@ -529,8 +540,31 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 continue;
             };
             let side = usize::from(corner[axis] > 0);
-            self.add_pressure_on_wall(cell, axis, side, share, point);
+            match self.weight_of_one_cell(cell, axis, corner) {
+                Some(weight) => point.pressure_offset += share * weight,
+                None => self.add_pressure_on_wall(cell, axis, side, share, point),
+            }
         }
+    }
+
+    /// The weight of a layer in which one cell has a pressure, on a floor of the plane to which it sticks. Where a flow that
+    /// comes to rest is pressed together the pressure in that cell bears the stress across, up to μ p, and exceeds the
+    /// weight; along the floor nothing stretches and the pressure is the weight. Extrapolated from the cell it held
+    /// the front back, by an error in proportion to the cell.
+    fn weight_of_one_cell(&self, cell: usize, axis: usize, corner: [usize; D]) -> Option<f64> {
+        let weight = weight_onto(&self.acceleration, axis, 0);
+        let above = self.topology.cell_neighbours[cell][axis][1];
+        let is_one = D == 2
+            && corner[axis] == 0
+            && weight > 0.0
+            && self.sticks(axis, corner)
+            && self.faces.pressure[cell] != NONE
+            && above != NONE
+            && self.faces.pressure[above] == NONE;
+        is_one.then(|| {
+            let filled = self.fractions[cell] + self.fractions[above];
+            weight * filled * self.grid.axes()[axis].spacing() + self.pressure_beyond(above, 0.0)
+        })
     }
 
     /// Adds a share of the pressure on the wall beside a cell: extrapolated from it and the one behind it, under a

@@ -101,9 +101,7 @@ pub(crate) fn faces_over<const D: usize>(
         }
     }
     for own in lying {
-        faces.role[own.0][own.1] = Face::Own(faces.own.len());
-        faces.own.push(own);
-        faces.is_thin.push(false);
+        faces.role[own.0][own.1] = faces.take(own.0, own.1, false, NONE);
     }
     faces.shares = Some(shares);
     faces
@@ -178,9 +176,8 @@ fn own_role<const D: usize>(
     } else if !open {
         return (Face::Loose, free);
     }
-    faces.own.push((component, face));
-    faces.is_thin.push(is_thin);
-    (Face::Own(faces.own.len() - 1), Waiting::No)
+    let own = faces.take(component, face, is_thin, NONE);
+    (own, Waiting::No)
 }
 
 /// The thin layers of most mass, one for each other component, whose unknowns lie beside a face, and its velocity over

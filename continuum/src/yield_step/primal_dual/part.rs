@@ -251,7 +251,9 @@ fn free_cells<const D: usize, const C: usize, const V: usize>(
     let mut beside = vec![[UNSEEN; 2]; marked.len()];
     let mut is_free = vec![false; discretisation.cells()];
     let mut faces = vec![Vec::new(); discretisation.cells()];
-    for &(cell, j, _) in discretisation.divergence() {
+    // A velocity through which nothing leaves the cell does not make it free.
+    let fluxes = discretisation.divergence().iter();
+    for &(cell, j, _) in fluxes.filter(|&&(_, _, area)| area != 0.0) {
         if marked[j] {
             let side = usize::from(beside[j][0] != UNSEEN);
             beside[j][side] = cell;
