@@ -248,6 +248,40 @@ impl Simulation {
         Ok(())
     }
 
+    /// Puts a patch of no run in, whose pairs are all its own: its grains get numbers that none has had, rising as theirs do.
+    ///
+    /// # Errors
+    /// As [`put_back`](Self::put_back), or if numbers have run out.
+    pub fn put_in(&mut self, patch: &Patch) -> Result<Patch, SetupError> {
+        let first = self.next_id;
+        let count = u32::try_from(patch.ids.len()).ok();
+        let Some(end) = count.and_then(|count| first.checked_add(count)) else {
+            return Err(SetupError::OutOfRange {
+                key: "grains inserted so far".into(),
+                value: f64::from(first) + patch.ids.len() as f64,
+                allowed: "below 2³²",
+            });
+        };
+        let own = |id: &u32| patch.ids.binary_search(id).unwrap_or(usize::MAX);
+        let named = |id: &u32| (own(id) as u32).saturating_add(first);
+        let named = Patch {
+            grains: patch.grains.clone(),
+            ids: (first..end).collect(),
+            pairs: patch
+                .pairs
+                .iter()
+                .map(|[a, b]| [named(a), named(b)])
+                .collect(),
+            histories: patch.histories.clone(),
+        };
+        self.next_id = end;
+        let put = self.put_back(&named);
+        if put.is_err() {
+            self.next_id = first;
+        }
+        put.map(|()| named)
+    }
+
     /// Histories of a patch to its contacts, beside those that there are.
     fn give_histories(&mut self, patch: &Patch) {
         let width = self.layout.history;
