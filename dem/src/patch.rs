@@ -248,7 +248,8 @@ impl Simulation {
         Ok(())
     }
 
-    /// Puts a patch of no run in, whose pairs are all its own: its grains get numbers that none has had, rising as theirs do.
+    /// Puts a patch of no run in: its grains get numbers that none has had, rising as theirs do, and those contacts stay both of
+    /// whose grains it has. Says how they are called.
     ///
     /// # Errors
     /// As [`put_back`](Self::put_back), or if numbers have run out.
@@ -262,18 +263,23 @@ impl Simulation {
                 allowed: "below 2³²",
             });
         };
-        let own = |id: &u32| patch.ids.binary_search(id).unwrap_or(usize::MAX);
-        let named = |id: &u32| (own(id) as u32).saturating_add(first);
-        let named = Patch {
+        let name = |id: &u32| {
+            let own = patch.ids.binary_search(id).ok()?;
+            Some(first + own as u32)
+        };
+        let mut named = Patch {
             grains: patch.grains.clone(),
             ids: (first..end).collect(),
-            pairs: patch
-                .pairs
-                .iter()
-                .map(|[a, b]| [named(a), named(b)])
-                .collect(),
-            histories: patch.histories.clone(),
+            ..Patch::default()
         };
+        let width = patch.width();
+        for (k, [a, b]) in patch.pairs.iter().enumerate() {
+            if let (Some(a), Some(b)) = (name(a), name(b)) {
+                named.pairs.push([a, b]);
+                let row = &patch.histories[k * width..(k + 1) * width];
+                named.histories.extend_from_slice(row);
+            }
+        }
         self.next_id = end;
         let put = self.put_back(&named);
         if put.is_err() {
