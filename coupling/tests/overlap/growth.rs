@@ -325,7 +325,7 @@ fn a_side_that_comes_in_leaves_the_store_of_the_others() {
         let mut bed = Bed::cut();
         let face = bed.face();
         let ids = bed.stored([face - 1.5, face]);
-        bed.advance(0.5, 1.0);
+        bed.advance(3.0, 1.0);
         if shrink {
             let made = bed.bowl.move_side(LEFT, false, &mut bed.simulation);
             assert!(made.unwrap());
