@@ -120,7 +120,7 @@ const MOVING: [&str; 2] = ["zones.moving=true", "zones.near_diameters=1.5"];
 const SHEARED: [&str; 6] = [
     "zones.moving=true",
     "zones.near_diameters=1.5",
-    "zones.misplaced_shear=0.1",
+    "zones.misplaced_shear=0.02",
     "zones.returning=sheared",
     "zones.sheared_inertial=[0.3]",
     "zones.sheared_grains=150",
