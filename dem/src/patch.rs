@@ -248,6 +248,46 @@ impl Simulation {
         Ok(())
     }
 
+    /// Puts a patch of no run in: its grains get numbers that none has had, rising as theirs do, and those contacts stay both of
+    /// whose grains it has. Says how they are called.
+    ///
+    /// # Errors
+    /// As [`put_back`](Self::put_back), or if numbers have run out.
+    pub fn put_in(&mut self, patch: &Patch) -> Result<Patch, SetupError> {
+        let first = self.next_id;
+        let count = u32::try_from(patch.ids.len()).ok();
+        let Some(end) = count.and_then(|count| first.checked_add(count)) else {
+            return Err(SetupError::OutOfRange {
+                key: "grains inserted so far".into(),
+                value: f64::from(first) + patch.ids.len() as f64,
+                allowed: "below 2³²",
+            });
+        };
+        let name = |id: &u32| {
+            let own = patch.ids.binary_search(id).ok()?;
+            Some(first + own as u32)
+        };
+        let mut named = Patch {
+            grains: patch.grains.clone(),
+            ids: (first..end).collect(),
+            ..Patch::default()
+        };
+        let width = patch.width();
+        for (k, [a, b]) in patch.pairs.iter().enumerate() {
+            if let (Some(a), Some(b)) = (name(a), name(b)) {
+                named.pairs.push([a, b]);
+                let row = &patch.histories[k * width..(k + 1) * width];
+                named.histories.extend_from_slice(row);
+            }
+        }
+        self.next_id = end;
+        let put = self.put_back(&named);
+        if put.is_err() {
+            self.next_id = first;
+        }
+        put.map(|()| named)
+    }
+
     /// Histories of a patch to its contacts, beside those that there are.
     fn give_histories(&mut self, patch: &Patch) {
         let width = self.layout.history;

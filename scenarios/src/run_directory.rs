@@ -25,13 +25,15 @@ pub const CHECKPOINT: &str = "checkpoint.h5";
 pub const CHECKPOINT_BEFORE: &str = "checkpoint_before.h5";
 /// Name of the packing that a run starts from.
 pub const PACKING: &str = "packing.h5";
+/// Name of the packings in steady shear that a run takes grains from.
+pub const SHEARED: &str = "sheared.h5";
 /// Name of the log.
 pub const LOG: &str = "log.txt";
 /// The run in motion.
 pub const ANIMATION: &str = "animation.gif";
 
 /// Every file that a run, a campaign or a comparison writes.
-const OWN_FILES: [&str; 26] = [
+const OWN_FILES: [&str; 27] = [
     ANIMATION,
     SCENE,
     REPORT,
@@ -39,6 +41,7 @@ const OWN_FILES: [&str; 26] = [
     CHECKPOINT,
     CHECKPOINT_BEFORE,
     PACKING,
+    SHEARED,
     LOG,
     "grains.vtkhdf",
     "contacts.vtkhdf",

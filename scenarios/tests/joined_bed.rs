@@ -116,15 +116,30 @@ fn a_ball_sinks_into_a_joined_bed_as_into_grains() {
 /// A box that grows.
 const MOVING: [&str; 2] = ["zones.moving=true", "zones.near_diameters=1.5"];
 
+/// And takes grains of sheared packings for what was sheared while it was stored.
+const SHEARED: [&str; 6] = [
+    "zones.moving=true",
+    "zones.near_diameters=1.5",
+    "zones.misplaced_shear=0.02",
+    "zones.returning=sheared",
+    "zones.sheared_inertial=[0.3]",
+    "zones.sheared_grains=150",
+];
+
 /// Killed twice on the way, its box growing, it goes on to the same bits, with another number of threads.
 #[test]
 fn a_joined_bed_goes_on_after_a_kill() {
     let folder = tempfile::tempdir().unwrap();
-    let mut whole = joined("whole", &MOVING);
+    let mut whole = joined("whole", &SHEARED);
     whole.extend(["--threads", "2"]);
     succeed(folder.path(), &whole);
-    assert!(value(&summary(&folder.path().join("whole")), "moves") >= 3.0);
-    let mut killed = joined("killed", &MOVING);
+    let found = summary(&folder.path().join("whole"));
+    let replaced = value(&found, "replaced");
+    println!("{replaced} replaced at {} moves", value(&found, "moves"));
+    assert!(value(&found, "moves") >= 3.0 && replaced > 10.0);
+    assert!(value(&found, "ledger_grains") < 1e-10 && value(&found, "ledger_exchange") < 1e-10);
+    assert!(found["ledger"]["mass_relative"].as_f64().unwrap().abs() < 1e-12);
+    let mut killed = joined("killed", &SHEARED);
     killed.extend(["--checkpoint-every", "0", "--threads", "1"]);
     let checkpoint = folder.path().join("killed/checkpoint.h5");
     for _ in 0..2 {
@@ -144,7 +159,7 @@ fn a_joined_bed_goes_on_after_a_kill() {
             killed.push("--resume");
         }
     }
-    let mut last = joined("killed", &MOVING);
+    let mut last = joined("killed", &SHEARED);
     last.push("--resume");
     succeed(folder.path(), &last);
     let [whole, resumed] = ["whole", "killed"].map(|name| hash(&folder.path().join(name)));
@@ -212,6 +227,21 @@ fn bad_joined_beds_are_refused_by_key() {
             &["zones.moving=true", "zones.wake_speed_scaled=0.0001"],
             "zones.wake_speed_scaled",
             "above zones.rest_speed_scaled",
+        ),
+        (
+            &["zones.returning=sheared"],
+            "zones.returning",
+            "zones.moving = true",
+        ),
+        (
+            &["zones.moving=true", "zones.returning=sheared"],
+            "zones.returning",
+            "zones.misplaced_shear",
+        ),
+        (
+            &["zones.moving=true", "zones.sheared_grains=200"],
+            "zones.sheared_grains",
+            "zones.returning",
         ),
         (
             &["zones.cell_diameters=3"],

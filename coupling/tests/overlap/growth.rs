@@ -11,12 +11,12 @@ use nalgebra::Vector3;
 use std::ops::ControlFlow;
 use std::sync::OnceLock;
 
-const SIZE: [f64; 3] = [26.0, 10.0, 10.0];
-const GRAINS: usize = 2600;
-const STIFFNESS: f64 = 2e4;
-const DENSITY: f64 = 6.0 / std::f64::consts::PI;
+pub(super) const SIZE: [f64; 3] = [26.0, 10.0, 10.0];
+pub(super) const GRAINS: usize = 2600;
+pub(super) const STIFFNESS: f64 = 2e4;
+pub(super) const DENSITY: f64 = 6.0 / std::f64::consts::PI;
 
-fn domain() -> Domain {
+pub(super) fn domain() -> Domain {
     Domain {
         lower: Vector3::repeat(-1.0),
         upper: Vector3::new(SIZE[0] + 1.0, SIZE[1] + 1.0, 60.0),
@@ -24,8 +24,8 @@ fn domain() -> Domain {
     }
 }
 
-fn setup(grains: Vec<Grain>) -> Setup {
-    // Springs of contacts with walls are not kept: these have none.
+/// Springs of contacts with walls are not kept: these have none.
+pub(super) fn laws() -> Laws {
     let law = |friction| {
         ContactLaw::linear(
             Hooke::matched(STIFFNESS, 0.5),
@@ -33,15 +33,19 @@ fn setup(grains: Vec<Grain>) -> Setup {
             None,
         )
     };
+    Laws {
+        own: vec![law(0.5), law(0.0)],
+        pairs: vec![(0, 1, law(0.0))],
+    }
+}
+
+fn setup(grains: Vec<Grain>) -> Setup {
     let smooth = |point, normal| Wall::plane(point, normal).material(1);
     let far = Vector3::new(SIZE[0], SIZE[1], 0.0);
     Setup {
         domain: domain(),
         gravity: -Vector3::z(),
-        law: Laws {
-            own: vec![law(0.5), law(0.0)],
-            pairs: vec![(0, 1, law(0.0))],
-        },
+        law: laws(),
         grains,
         walls: vec![
             smooth(Vector3::zeros(), Vector3::z()),
@@ -57,7 +61,7 @@ fn setup(grains: Vec<Grain>) -> Setup {
 }
 
 /// A bed that rests, with the springs that hold it.
-fn rested() -> Simulation {
+pub(super) fn rested() -> Simulation {
     static BED: OnceLock<(Vec<Grain>, Record)> = OnceLock::new();
     let (grains, record) = BED.get_or_init(|| {
         let radius = RadiusLaw::Uniform {
@@ -100,7 +104,7 @@ fn calm(simulation: &mut Simulation) {
 }
 
 /// No side moves by itself.
-const TRAVEL: Travel = Travel {
+pub(super) const TRAVEL: Travel = Travel {
     width: 2.0,
     rest: 0.0,
     wake: 10.0,
@@ -109,7 +113,7 @@ const TRAVEL: Travel = Travel {
     fewest: 20.0,
 };
 
-fn spec(simulation: &mut Simulation, travel: Travel) -> BowlSpec {
+pub(super) fn spec(simulation: &mut Simulation, travel: Travel, misplaced: f64) -> BowlSpec {
     let grains = simulation.grain_list();
     let middle = Region::Block {
         lower: Vector3::new(2.0, 2.0, 1.5),
@@ -139,25 +143,34 @@ fn spec(simulation: &mut Simulation, travel: Travel) -> BowlSpec {
         bottom: 0.0,
         settings: settings.resolve(&scales, false).unwrap(),
         ball: None,
-        growth: Some(Growth { travel, near: 3.0 }),
+        growth: Some(Growth {
+            travel,
+            near: 3.0,
+            fastest: f64::INFINITY,
+            misplaced,
+        }),
     }
 }
 
-struct Bed {
-    simulation: Simulation,
-    bowl: Bowl,
+pub(super) struct Bed {
+    pub simulation: Simulation,
+    pub bowl: Bowl,
     /// Momentum that damping gave (negative: took).
-    damped: Vector3<f64>,
+    pub damped: Vector3<f64>,
 }
 
 impl Bed {
-    fn cut() -> Self {
+    pub(super) fn cut() -> Self {
         Self::with(TRAVEL)
     }
 
-    fn with(travel: Travel) -> Self {
+    pub(super) fn with(travel: Travel) -> Self {
+        Self::of(travel, f64::INFINITY)
+    }
+
+    pub(super) fn of(travel: Travel, misplaced: f64) -> Self {
         let mut simulation = rested();
-        let spec = spec(&mut simulation, travel);
+        let spec = spec(&mut simulation, travel, misplaced);
         let bowl = Bowl::cut(spec, &mut simulation).unwrap();
         Self {
             simulation,
@@ -167,7 +180,7 @@ impl Bed {
     }
 
     /// Goes on for a time, keeping so much of the velocities at every exchange.
-    fn advance(&mut self, time: f64, keep: f64) {
+    pub(super) fn advance(&mut self, time: f64, keep: f64) {
         let each = Bowl::steps_of_loads(&self.bowl.spec().settings, self.simulation.timestep());
         let all = (time / self.simulation.timestep()).round() as u64;
         for _ in 0..all / each {
@@ -182,7 +195,7 @@ impl Bed {
     }
 
     /// Errors of mass, volume and both books.
-    fn books(&mut self) -> [f64; 4] {
+    pub(super) fn books(&mut self) -> [f64; 4] {
         let account = self.bowl.account(&self.simulation);
         let now = self.bowl.grain_momentum(&mut self.simulation) - self.damped;
         [
@@ -196,7 +209,7 @@ impl Bed {
 
 /// Mean stresses σ_xx and σ_zz of grains' contacts, compression positive, between two places along x and well below the
 /// surface.
-fn stresses(simulation: &mut Simulation, [low, high]: [f64; 2]) -> [f64; 2] {
+pub(super) fn stresses(simulation: &mut Simulation, [low, high]: [f64; 2]) -> [f64; 2] {
     let mut seen = Snapshot::default();
     simulation.snapshot(&mut seen);
     let mut sums = [0.0; 2];
@@ -218,7 +231,7 @@ fn stresses(simulation: &mut Simulation, [low, high]: [f64; 2]) -> [f64; 2] {
 }
 
 /// Force that nothing balances over the weight, rms over the grains with these numbers.
-fn unbalanced(simulation: &mut Simulation, ids: &[u32]) -> f64 {
+pub(super) fn unbalanced(simulation: &mut Simulation, ids: &[u32]) -> f64 {
     let mut seen = Snapshot::default();
     simulation.snapshot(&mut seen);
     let weight = |g: &GrainSample| -g.mass * Vector3::z();
@@ -237,21 +250,21 @@ fn unbalanced(simulation: &mut Simulation, ids: &[u32]) -> f64 {
 
 impl Bed {
     /// Where the side at high x lies (d).
-    fn face(&self) -> f64 {
+    pub(super) fn face(&self) -> f64 {
         let mut sides = self.bowl.zone().sides.iter();
         let side = sides.find(|side| side.number() == RIGHT).unwrap();
         2.0 * side.face as f64
     }
 
     /// Numbers of the stored grains between two places along x.
-    fn stored(&self, [low, high]: [f64; 2]) -> Vec<u32> {
+    pub(super) fn stored(&self, [low, high]: [f64; 2]) -> Vec<u32> {
         let store = self.bowl.stored();
         let rows = store.grains.iter().zip(&store.ids);
         let of = rows.filter(|(g, _)| (low..high).contains(&g.position.x));
         of.map(|(_, id)| *id).collect()
     }
 
-    fn grow(&mut self) {
+    pub(super) fn grow(&mut self) {
         let books = self.books();
         assert!(
             self.bowl
@@ -269,8 +282,9 @@ impl Bed {
     }
 }
 
-/// The side at high x.
-const RIGHT: usize = 1;
+/// The sides at low and at high x.
+const LEFT: usize = 0;
+pub(super) const RIGHT: usize = 1;
 
 /// Grains that are put back stand in balance as they did in the bed that they were taken from; without the histories
 /// of their contacts, or elsewhere, they do not.
@@ -304,8 +318,59 @@ fn grains_that_are_put_back_are_in_balance() {
     assert!(without > 1.0 && moved > 2.0, "{without} {moved}");
 }
 
+/// A side that comes in keeps its own strip, and what the shell of another had been before it bore tractions.
+#[test]
+fn a_side_that_comes_in_leaves_the_store_of_the_others() {
+    let run = |shrink: bool| {
+        let mut bed = Bed::cut();
+        let face = bed.face();
+        let ids = bed.stored([face - 1.5, face]);
+        bed.advance(3.0, 1.0);
+        if shrink {
+            let made = bed.bowl.move_side(LEFT, false, &mut bed.simulation);
+            assert!(made.unwrap());
+            let books = bed.books();
+            assert!(books[1].abs() < 1e-12 && books[2] < 1e-12 && books[3] < 1e-12);
+        }
+        let lay = |bed: &Bed| {
+            let store = bed.bowl.stored();
+            let rows = store.ids.iter().zip(&store.grains);
+            let of = rows.filter(|(id, _)| ids.binary_search(id).is_ok());
+            of.map(|(_, g)| g.position).collect::<Vec<_>>()
+        };
+        let stored = lay(&bed);
+        bed.grow();
+        (stored, unbalanced(&mut bed.simulation, &ids))
+    };
+    let [(left, alone), (kept, after)] = [run(false), run(true)];
+    println!("unbalanced: alone {alone:.3e}, after another side came in {after:.3e}");
+    assert_eq!(left, kept);
+    assert!(after < 1.05 * alone, "{after} {alone}");
+}
+
+/// A memory whose box has no grains beyond its overlap is refused in words.
+#[test]
+fn a_memory_with_too_narrow_a_box_is_refused() {
+    let bed = Bed::cut();
+    let mut memory = Vec::new();
+    bed.bowl.write(&mut memory);
+    let corners = bed.bowl.zone().corners();
+    let place = memory.windows(5).position(|w| w == corners).unwrap();
+    for width in [1.0, 3.0, 4.0] {
+        memory[place + 3] = corners[0] + width;
+        let error = Bowl::read(*bed.bowl.spec(), &memory, &bed.simulation);
+        let error = error.err().unwrap().to_string();
+        assert!(
+            error.contains("cells along x beyond its overlap"),
+            "{error}"
+        );
+    }
+    memory[place + 3] = corners[0] + 5.0;
+    assert!(Bowl::read(*bed.bowl.spec(), &memory, &bed.simulation).is_ok());
+}
+
 /// Rms speed of the grains.
-fn speed(simulation: &Simulation) -> f64 {
+pub(super) fn speed(simulation: &Simulation) -> f64 {
     let sums = simulation.held(|_| true).fold([0.0; 2], |[e, m], g| {
         [e + g.mass * g.velocity.norm_squared(), m + g.mass]
     });
@@ -416,6 +481,15 @@ fn a_box_that_has_grown_goes_on_from_its_numbers_and_within_its_budget() {
         (1.0, 0)
     );
     assert!(kept.simulation.grain_count() as f64 <= most);
+    // Grains beside both sides are fast for many exchanges: each wants to go out once.
+    kept = Bed::with(Travel {
+        budget: most,
+        wake: 1e-9,
+        rest: 0.0,
+        ..TRAVEL
+    });
+    kept.advance(4.0, 1.0);
+    assert_eq!(kept.bowl.refused_moves(), 2.0);
 }
 
 /// Grains are thrown up in the middle of a bed at rest: both sides, where nothing moves, come nearer; then those beside a

@@ -3,6 +3,7 @@
 mod bed_file;
 pub mod joined;
 mod moves;
+mod sheared_packings;
 
 use super::world::workshop::{Surroundings, softened, step_for};
 use super::world::{Expected, Ran, Recipe, Workshop, World};

@@ -19,6 +19,11 @@ const UNDER: f64 = 2.0;
 const TIME: f64 = 2.0;
 /// The time between two exchanges over that: a third of it costs more and is no nearer to grains alone.
 const EXCHANGE: f64 = 0.6;
+/// Packings in steady shear, where nobody says: inertial numbers, and grains.
+const SHEARED_INERTIAL: [f64; 2] = [0.05, 0.3];
+const SHEARED_GRAINS: usize = 600;
+/// Pressure beside a ball over ρ v².
+const STRUCK: f64 = 0.1;
 
 /// Where grains stay, at scale 1. What is left out is computed; `colluvium plan` says it.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -62,6 +67,37 @@ pub struct BallZoneKeys {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 1, "maximum" = 1.0e9))]
     pub budget: Option<u64>,
+    /// Inertial number of the continuum beside a side of a moving box above which the side goes outwards. Left out: that up to which
+    /// the calibrated law was measured.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
+    pub fastest_inertial: Option<f64>,
+    /// Shear of what is stored beside a side of a moving box, since it was put by, above which the side goes outwards. Left out:
+    /// none is.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
+    pub misplaced_shear: Option<f64>,
+    /// What comes back where that has been sheared farther, with zones.moving.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub returning: Option<ReturningKind>,
+    /// Inertial numbers at which packings are sheared before the run, with zones.returning = "sheared"; left out: 0.05 and 0.3.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minItems" = 1, "maxItems" = 8, "items" = {"type": "number", "minimum": 1.0e-3, "maximum": 1.0}))]
+    pub sheared_inertial: Option<Vec<f64>>,
+    /// Grains of each of these packings; left out: 600.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minimum" = 100, "maximum" = 100000))]
+    pub sheared_grains: Option<u64>,
+}
+
+/// What comes back where stored grains have been sheared.
+#[derive(Clone, Copy, Debug, PartialEq, Eq, Serialize, Deserialize, JsonSchema)]
+#[serde(rename_all = "kebab-case")]
+pub enum ReturningKind {
+    /// The stored grains, where the continuum has carried them.
+    Stored,
+    /// Grains of packings in steady shear, made before the run.
+    Sheared,
 }
 
 fn wakes() -> f64 {
@@ -92,6 +128,11 @@ impl Default for BallZoneKeys {
             rest_speed_scaled: rests(),
             hold_scaled: holds(),
             budget: None,
+            fastest_inertial: None,
+            misplaced_shear: None,
+            returning: None,
+            sheared_inertial: None,
+            sheared_grains: None,
         }
     }
 }
@@ -186,8 +227,8 @@ impl BallImpactScene {
         self.zones.near_diameters.unwrap_or(computed)
     }
 
-    /// When the box grows and shrinks, if it moves.
-    pub fn growth(&self, diameter: f64, settings: &Resolved) -> Option<Growth> {
+    /// When the box grows and shrinks, if it moves; `valid` is the I up to which the law was measured.
+    pub fn growth(&self, diameter: f64, settings: &Resolved, valid: f64) -> Option<Growth> {
         let zones = &self.zones;
         zones.moving.then(|| Growth {
             travel: Travel {
@@ -199,7 +240,34 @@ impl BallImpactScene {
                 fewest: FEWEST_GRAINS,
             },
             near: self.near_diameters() * diameter,
+            fastest: zones.fastest_inertial.unwrap_or(valid),
+            misplaced: zones.misplaced_shear.unwrap_or(f64::INFINITY),
         })
+    }
+
+    /// Whether packings in steady shear are made.
+    pub fn returns_sheared(&self) -> bool {
+        self.zones.returning == Some(ReturningKind::Sheared)
+    }
+
+    /// I of these packings, given or not.
+    pub fn sheared_inertial(&self) -> Vec<f64> {
+        let given = self.zones.sheared_inertial.clone();
+        given.unwrap_or_else(|| SHEARED_INERTIAL.to_vec())
+    }
+
+    /// Their grains.
+    pub fn sheared_grains(&self) -> usize {
+        self.zones
+            .sheared_grains
+            .map_or(SHEARED_GRAINS, |n| n as usize)
+    }
+
+    /// Pressures that they are sheared under (Pa): of half of the bed's depth at rest, and of its inertia beside the ball, a
+    /// tenth of ρ v².
+    pub fn sheared_pressures(&self, density: f64, depth: f64) -> [f64; 2] {
+        let rest = 0.5 * density * self.gravity * depth;
+        [rest, rest.max(STRUCK * density * self.speed.powi(2))]
     }
 
     /// The overlap's settings with nothing left out.
@@ -245,6 +313,31 @@ impl BallImpactScene {
         if let (Some(near), false) = (zones.near_diameters, zones.moving) {
             let range = "given with zones.moving = true: a box that stays is never too near";
             return Err(at("zones").refuse("near_diameters", near, range));
+        }
+        let given = [
+            ("fastest_inertial", zones.fastest_inertial.is_some()),
+            ("misplaced_shear", zones.misplaced_shear.is_some()),
+            ("returning", zones.returning.is_some()),
+        ];
+        if let Some((key, _)) = given.iter().find(|(_, given)| *given && !zones.moving) {
+            let range = "given with zones.moving = true: a box that stays gives nothing back";
+            return Err(at("zones").refuse(key, "given", range));
+        }
+        if self.returns_sheared() && zones.misplaced_shear.is_none() {
+            let range =
+                "\"stored\", or given with zones.misplaced_shear, from which on packings are taken";
+            return Err(at("zones").refuse("returning", "sheared", range));
+        }
+        let given = [
+            ("sheared_inertial", zones.sheared_inertial.is_some()),
+            ("sheared_grains", zones.sheared_grains.is_some()),
+        ];
+        if let Some((key, _)) = given
+            .iter()
+            .find(|(_, given)| *given && !self.returns_sheared())
+        {
+            let range = "given with zones.returning = \"sheared\": else no packing is made";
+            return Err(at("zones").refuse(key, "given", range));
         }
         if zones.wake_speed_scaled <= zones.rest_speed_scaled {
             let range = format!(

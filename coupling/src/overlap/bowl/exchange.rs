@@ -179,6 +179,7 @@ impl Bowl {
         for (owed, given) in self.owed.iter_mut().zip(&self.given.relaxation) {
             *owed -= given;
         }
+        self.bear();
         self.watch_impulses();
         self.account.traction += self.given.traction;
         self.account.impedance += self.given.impedance;

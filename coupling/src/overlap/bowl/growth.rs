@@ -3,39 +3,30 @@
 //! What lies outside the box, and its shell, is kept as the grains it was when the bed was cut, with their contacts ([`Patch`]), and goes
 //! where the continuum goes. After an exchange a side of the box may make one move of the buffer's width:
 //!
-//! - *outwards*, where the ball has come nearer to the overlap's inner end than asked for, or where the grains of the
-//!   inner overlap, their rms speed with its fluctuations, are faster than v_wake: the stored grains there are put back with
+//! - *outwards*: the stored grains there are put back with
 //!   their numbers and springs, and with the continuum's velocity. The shell of that side goes: its grains were held by
 //!   tractions instead of neighbours and have lost their places, so that it is kept as it was, too, and put back with the
-//!   rest. What would still lie deeper in others than any contact of the bed did is moved out of them (`room.rs`);
-//! - *inwards*, where the grains that would be continuum or overlap have been slower than v_rest < v_wake for a time while
-//!   others beyond are faster, and the ball is far: they are put by with their contacts. Each move outwards of a side doubles
-//!   the time that its next one inwards waits for.
+//!   rest. What would still lie deeper in others than any contact of the bed did is moved out of them (`room.rs`). Where the
+//!   continuum has sheared what was stored too far for its contacts to mean anything, grains of a stored sheared packing come
+//!   in its place if there are any (`returning.rs`);
+//! - *inwards*: the strip's grains and the new shell are put by with their contacts.
+//!
+//! `oracle.rs` says when.
 //!
 //! The continuum's surface stays where it was in each column of cells. Stored grains weigh what they weigh and the
 //! continuum in their place what its law says: the difference is taken off the surface of the continuum, evenly, so that a
 //! move changes no mass; that of momenta the continuum gives back with what it owes. A move outwards beyond a budget of
 //! grains is refused and counted. Every move is kept with its reason ([`Move`]).
 
+use super::gradients::{gradient_at, gradients};
 use super::journey::{Growth, Move, Reason};
-use super::room::{Overlaps, make_room};
+use super::room::Overlaps;
+use super::store::{Store, stretched};
 use super::zone::{SIDES, Side, Zone};
 use super::{Bowl, OverlapError};
 use crate::overlap::sighting::free_mass;
-use colluvium_dem::{Grain, GrainSample, Partner, Patch, Simulation};
-use nalgebra::Vector3;
-
-/// What the grains beside a side do.
-#[derive(Clone, Copy, Debug, Default)]
-struct Beside {
-    /// Rms speed in the inner overlap (m/s).
-    inner: f64,
-    /// Of what would be continuum or overlap after a move inwards, and of the grains beyond (m/s).
-    outer: f64,
-    front: f64,
-    /// How many those beyond are.
-    count: f64,
-}
+use colluvium_dem::{Grain, Partner, Patch, Simulation};
+use nalgebra::{Matrix3, Vector3};
 
 impl Bowl {
     /// Moves of the box so far.
@@ -43,19 +34,28 @@ impl Bowl {
         &self.journey.moves
     }
 
-    /// Moves outwards that were refused.
+    /// Moves outwards that were refused; one that is refused at exchange after exchange counts once.
     pub fn refused_moves(&self) -> f64 {
         self.journey.refused
     }
 
     /// Grains put by outside the box, and its shell as it was put by.
     pub fn stored(&self) -> &Patch {
-        &self.journey.store
+        &self.journey.store.patch
     }
 
     /// The same, for whoever knows better how they lie.
     pub fn stored_mut(&mut self) -> &mut Patch {
-        &mut self.journey.store
+        &mut self.journey.store.patch
+    }
+
+    /// Deforms what is stored about a place by F = 1 + `step`, as the continuum would.
+    pub fn deform_stored(&mut self, about: &Vector3<f64>, step: &Matrix3<f64>) {
+        let Store { patch, stretch } = &mut self.journey.store;
+        for (grain, stretch) in patch.grains.iter_mut().zip(stretch) {
+            grain.position += step * (grain.position - about);
+            *stretch = stretched(stretch, step);
+        }
     }
 
     /// Puts by what lies outside the box when the bed is cut, and how its shell lay.
@@ -73,22 +73,50 @@ impl Bowl {
             usual: depths.iter().sum::<f64>() / depths.len().max(1) as f64,
             deepest: depths.iter().copied().fold(0.0, f64::max),
         };
-        let zone = self.layout.zone.clone();
-        self.journey.store = self.take_outside(&zone, simulation)?;
+        let (cells, zone, shell) = (self.layout.cells, self.layout.zone.clone(), self.shell());
+        let depth = |at: &Vector3<f64>| zone.label(&cells, at);
+        self.journey.store = Store::fresh(self.take_outside(shell, depth, simulation)?);
         Ok(())
     }
 
-    /// Takes what lies outside a box out of the run; with it, as it is, what lies in its shell and stays.
+    /// Takes what lies less deep than a shell out of the run; with it, as it is, what lies in the shell and stays.
     fn take_outside(
         &self,
-        zone: &Zone,
+        shell: f64,
+        depth: impl Fn(&Vector3<f64>) -> f64,
         simulation: &mut Simulation,
     ) -> Result<Patch, OverlapError> {
-        let (cells, shell, belongs) = (self.layout.cells, self.shell(), self.spec.belongs());
-        let patch = simulation.take_out(|g| belongs(g) && zone.label(&cells, &g.position) < shell);
-        let stays = |_, g: &Grain| zone.label(&cells, &g.position) >= 0.0;
+        let belongs = self.spec.belongs();
+        let patch = simulation.take_out(|g| belongs(g) && depth(&g.position) < shell);
+        let stays = |_, g: &Grain| depth(&g.position) >= 0.0;
         simulation.put_back(&patch.clone().split(stays))?;
         Ok(patch)
+    }
+
+    /// Puts by the strip that a side of the box moves over inwards, and that side's new shell. Grains in the shell of another
+    /// side bear its traction and have lost their places: of those that are kept from before, as they lay among their
+    /// neighbours, nothing new is kept.
+    fn put_by_strip(
+        &mut self,
+        zone: &Zone,
+        side: usize,
+        simulation: &mut Simulation,
+    ) -> Result<(), OverlapError> {
+        let (cells, shell) = (self.layout.cells, self.shell());
+        let (own, others): (Vec<Side>, Vec<Side>) =
+            zone.sides.iter().partition(|s| s.number() == side);
+        let &[own] = own.as_slice() else {
+            return Ok(());
+        };
+        let depth = |at: &Vector3<f64>| zone.depth(&cells, &own, at);
+        let mut patch = self.take_outside(shell, depth, simulation)?;
+        let store = &mut self.journey.store;
+        let borne = |at: &Vector3<f64>| others.iter().any(|s| zone.depth(&cells, s, at) < shell);
+        patch.split(|id, g| store.has(id) && borne(&g.position));
+        let patch = Store::fresh(patch);
+        store.split(|id, _| patch.has(id));
+        store.merge(&patch);
+        Ok(())
     }
 
     /// Width of the shell in cells.
@@ -128,6 +156,7 @@ impl Bowl {
             return Ok(false);
         };
         let moved = self.shift(&growth, side, outwards, (Reason::Asked, 0.0), simulation)?;
+        self.journey.refused += f64::from(u8::from(outwards && !moved));
         self.lay(simulation)?;
         Ok(moved)
     }
@@ -138,100 +167,29 @@ impl Bowl {
     }
 
     /// Cells by which a side moves.
-    fn stride(&self) -> isize {
+    pub(super) fn stride(&self) -> isize {
         self.layout.widths[0] as isize
     }
 
-    /// What is kept goes where the continuum has gone since the last exchange.
+    /// What is kept goes where the continuum has gone since the last exchange, and is sheared as it is.
     fn carry(&mut self) {
         let dt = self.exchange_time();
         let cells = &self.layout.cells;
-        for grain in self.journey.store.grains.iter_mut().filter(|g| !g.fixed) {
+        self.gradients = gradients(&self.view, cells);
+        let Store { patch, stretch } = &mut self.journey.store;
+        let rows = patch.grains.iter_mut().zip(stretch);
+        for (grain, stretch) in rows.filter(|(g, _)| !g.fixed) {
             let hats = cells.hats(&grain.position);
             let u = self.view.velocity_at(&hats).unwrap_or_default();
+            let gradient = gradient_at(&self.view, &self.gradients, &hats);
+            *stretch = stretched(stretch, &(dt * gradient));
             grain.position += dt * u;
             grain.velocity = u;
         }
     }
 
-    fn consider(
-        &mut self,
-        growth: &Growth,
-        side: Side,
-        simulation: &mut Simulation,
-    ) -> Result<(), OverlapError> {
-        let travel = &growth.travel;
-        let number = side.number();
-        let ball = self.ball_way(&side);
-        let beside = self.speeds_beside(&side);
-        let near = ball.is_some_and(|way| way < growth.near);
-        if near || beside.inner > travel.wake {
-            self.journey.resting[number] = 0.0;
-            let reason = match (near, ball) {
-                (true, Some(way)) => (Reason::Ball, way),
-                _ => (Reason::Speed, beside.inner),
-            };
-            return self.shift(growth, side, true, reason, simulation).map(drop);
-        }
-        let rests = beside.outer < travel.rest
-            && beside.front > travel.rest
-            && beside.count >= travel.fewest;
-        let resting = &mut self.journey.resting[number];
-        *resting = if rests { *resting + 1.0 } else { 0.0 };
-        let hold = travel.hold * 2.0_f64.powf(self.journey.returns[number]);
-        if self.journey.resting[number] * self.exchange_time() <= hold {
-            return Ok(());
-        }
-        // A box that let the ball come near at once would go to and fro.
-        let stride = self.stride() as f64 * self.layout.cells.spacing[side.axis];
-        if ball.is_none_or(|way| way - stride > 1.5 * growth.near) {
-            self.journey.resting[number] = 0.0;
-            let reason = (Reason::Rest, beside.outer);
-            self.shift(growth, side, false, reason, simulation)?;
-        }
-        Ok(())
-    }
-
-    /// Distance between the ball and the inner end of a side's overlap (m).
-    fn ball_way(&self, side: &Side) -> Option<f64> {
-        let layout = &self.layout;
-        let number = self.spec.ball?;
-        let grains = &self.sighting.snapshot.grains;
-        let ball = &grains[grains.binary_search_by_key(&number, |g| g.id).ok()?];
-        let depth = layout.zone.depth(&layout.cells, side, &ball.position) - layout.widths[1];
-        Some(depth * layout.cells.spacing[side.axis] - ball.radius)
-    }
-
-    fn speeds_beside(&self, side: &Side) -> Beside {
-        let (cells, zone) = (&self.layout.cells, &self.layout.zone);
-        let [handshake, inner] = self.layout.widths;
-        let outer = inner + self.stride() as f64;
-        let (mut squares, mut masses, mut count) = ([0.0; 3], [0.0; 3], 0.0);
-        let belongs = self.spec.belongs();
-        let mut add = |zone: usize, grain: &GrainSample| {
-            squares[zone] += grain.mass * grain.velocity.norm_squared();
-            masses[zone] += grain.mass;
-        };
-        for grain in self.sighting.snapshot.grains.iter().filter(|g| belongs(g)) {
-            let depth = zone.depth(cells, side, &grain.position);
-            if (handshake..inner).contains(&depth) {
-                add(0, grain);
-            }
-            add(if depth < outer { 1 } else { 2 }, grain);
-            count += f64::from(u8::from(depth >= outer));
-        }
-        let speed =
-            |zone: usize| f64::sqrt(squares[zone] / f64::max(masses[zone], f64::MIN_POSITIVE));
-        Beside {
-            inner: speed(0),
-            outer: speed(1),
-            front: speed(2),
-            count,
-        }
-    }
-
     /// Moves a side of the box; says whether it did.
-    fn shift(
+    pub(super) fn shift(
         &mut self,
         growth: &Growth,
         side: Side,
@@ -252,7 +210,7 @@ impl Bowl {
             depth < shell && zone.label(&cells, &g.position) >= 0.0
         };
         if outwards {
-            let grains = self.journey.store.grains.iter().filter(|g| joins(g));
+            let grains = self.stored().grains.iter().filter(|g| joins(g));
             let again = grains
                 .clone()
                 .filter(|g| old.label(&cells, &g.position) >= 0.0);
@@ -260,7 +218,6 @@ impl Bowl {
             let all = simulation.grain_count() as f64 + more;
             // Without any side there would be no continuum left.
             if all > growth.travel.budget || zone.sides.is_empty() {
-                self.journey.refused += 1.0;
                 return Ok(false);
             }
         } else {
@@ -269,26 +226,20 @@ impl Bowl {
                 return Ok(false);
             }
         }
+        self.gradients = gradients(&self.view, &cells);
         let before = self.counted();
         let heights = self.heights();
         let momentum = self.grain_momentum(simulation);
         let mass = free_mass(simulation);
-        let displaced = if outwards {
-            let mut patch = self.journey.store.split(|_, g| joins(g));
-            let mut kept = patch.clone();
-            simulation.remove(|g| patch.ids.binary_search(&g.id).is_ok());
+        let [displaced, replaced] = if outwards {
+            let coming = self.journey.store.split(|_, g| joins(g));
+            simulation.remove(|g| coming.has(g.id));
             self.sighting.look(simulation);
-            let displaced = self.fit(&mut patch);
-            simulation.put_back(&patch)?;
-            let shell = kept.split(|_, g| zone.label(&cells, &g.position) < shell);
-            self.journey.store.merge(&shell);
-            displaced
+            let below = |at: &Vector3<f64>| zone.label(&cells, at) < shell;
+            self.bring_back(coming, &heights, below, simulation)?
         } else {
-            let patch = self.take_outside(&zone, simulation)?;
-            let again = |id, _: &Grain| patch.ids.binary_search(&id).is_ok();
-            self.journey.store.split(again);
-            self.journey.store.merge(&patch);
-            0.0
+            self.put_by_strip(&zone, side.number(), simulation)?;
+            [0.0; 2]
         };
         let mass = free_mass(simulation) - mass;
         self.journey.farthest = self.farthest_moved();
@@ -316,28 +267,9 @@ impl Bowl {
             mass,
             grains: simulation.grain_count() as f64,
             displaced,
+            replaced,
             remainder,
         });
         Ok(true)
-    }
-
-    /// Makes room for a patch among the grains that are there; says how many grains of it were moved.
-    fn fit(&self, patch: &mut Patch) -> f64 {
-        for grain in &mut patch.grains {
-            grain.spin = Vector3::zeros();
-        }
-        let there = self.sighting.snapshot.grains.iter();
-        let there: Vec<_> = there.map(|g| (g.position, g.radius)).collect();
-        let (low, size, allowed) = (self.spec.low, self.spec.size, self.journey.overlaps);
-        let inside = |at: &mut Vector3<f64>, radius: f64| {
-            // Walls are as stiff as half of a pair: grains lie at most as deep in them.
-            let reach = (1.0 - 2.0 * allowed.deepest) * radius;
-            for axis in 0..2 {
-                at[axis] = at[axis].clamp(low[axis] + reach, low[axis] + size[axis] - reach);
-            }
-            at.z = at.z.max(low[2] + reach);
-        };
-        let room = make_room(&mut patch.grains, &there, allowed, inside);
-        room.moved
     }
 }

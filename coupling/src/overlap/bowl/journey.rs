@@ -1,6 +1,7 @@
 //! What a box that grows is asked for, and what it remembers.
 
 use super::room::Overlaps;
+use super::store::{STRETCHES, Store};
 use super::zone::SIDES;
 use crate::overlap::material_edge::Travel;
 use colluvium_dem::Patch;
@@ -12,6 +13,11 @@ pub struct Growth {
     pub travel: Travel,
     /// Distance between the ball and the inner end of the overlap below which a side moves outwards (m).
     pub near: f64,
+    /// I of the continuum beside a side above which it moves outwards; infinite: none does.
+    pub fastest: f64,
+    /// Shear of what is stored above which it is misplaced: a side moves outwards before it, and sheared packings take its
+    /// place; infinite: nothing is.
+    pub misplaced: f64,
 }
 
 /// Why a side moves.
@@ -25,11 +31,22 @@ pub enum Reason {
     Rest,
     /// The caller wants it.
     Asked,
+    /// The continuum beside it is sheared faster than its law was calibrated for: with its inertial number.
+    Inertial,
+    /// What is stored beside it has been sheared since: with its shear.
+    Misplaced,
 }
 
 impl Reason {
     /// All of them, by their numbers.
-    pub const ALL: [Reason; 4] = [Reason::Ball, Reason::Speed, Reason::Rest, Reason::Asked];
+    pub const ALL: [Reason; 6] = [
+        Reason::Ball,
+        Reason::Speed,
+        Reason::Rest,
+        Reason::Asked,
+        Reason::Inertial,
+        Reason::Misplaced,
+    ];
 
     /// Its number in tables.
     pub fn number(self) -> usize {
@@ -38,7 +55,7 @@ impl Reason {
 
     /// Its name.
     pub fn word(self) -> &'static str {
-        ["ball", "speed", "rest", "asked"][self as usize]
+        ["ball", "speed", "rest", "asked", "inertial", "misplaced"][self as usize]
     }
 }
 
@@ -53,7 +70,7 @@ pub struct Move {
     pub place: f64,
     /// Why.
     pub reason: Reason,
-    /// The distance (m) or speed (m/s) that was the reason.
+    /// The distance (m), speed (m/s), inertial number or shear that was the reason.
     pub value: f64,
     /// Mass that became grains; negative: that became continuum (kg).
     pub mass: f64,
@@ -61,12 +78,14 @@ pub struct Move {
     pub grains: f64,
     /// Grains that were moved to make room.
     pub displaced: f64,
+    /// Grains of sheared packings that came in the place of stored ones.
+    pub replaced: f64,
     /// Mass that the continuum's surface gave for it beyond what lay in the place of the grains (kg).
     pub remainder: f64,
 }
 
 /// Numbers of a move.
-const NUMBERS: usize = 9;
+const NUMBERS: usize = 10;
 
 impl Move {
     fn numbers(&self) -> [f64; NUMBERS] {
@@ -79,6 +98,7 @@ impl Move {
             self.mass,
             self.grains,
             self.displaced,
+            self.replaced,
             self.remainder,
         ]
     }
@@ -93,6 +113,7 @@ impl Move {
             mass,
             grains,
             displaced,
+            replaced,
             remainder,
         ]: &[f64; NUMBERS],
     ) -> Option<Self> {
@@ -105,6 +126,7 @@ impl Move {
             mass,
             grains,
             displaced,
+            replaced,
             remainder,
         })
     }
@@ -114,11 +136,13 @@ impl Move {
 #[derive(Clone, Debug, Default, PartialEq)]
 pub(super) struct Journey {
     /// Grains outside the box and those of its shell.
-    pub store: Patch,
+    pub store: Store,
     pub moves: Vec<Move>,
     /// Exchanges for which each side has rested, and how often it has moved outwards.
     pub resting: [f64; SIDES],
     pub returns: [f64; SIDES],
+    /// 1 where a side's move outwards is being refused, else 0.
+    pub refusing: [f64; SIDES],
     /// Moves outwards that the budget or the walls did not allow.
     pub refused: f64,
     /// Overlaps of contacts when the bed was cut.
@@ -130,7 +154,8 @@ pub(super) struct Journey {
 impl Journey {
     /// All of it as rows of numbers.
     pub fn write(&self, put: &mut impl FnMut(&[f64])) {
-        put(&self.store.numbers());
+        put(&self.store.patch.numbers());
+        put(self.store.stretch.as_flattened());
         put(self
             .moves
             .iter()
@@ -139,24 +164,30 @@ impl Journey {
             .as_slice());
         put(&self.resting);
         put(&self.returns);
+        put(&self.refusing);
         let Overlaps { usual, deepest } = self.overlaps;
         put(&[self.refused, usual, deepest, self.farthest]);
     }
 
     /// From such rows.
     pub fn read<'a>(take: &mut impl FnMut() -> Option<&'a [f64]>) -> Option<Self> {
-        let store = Patch::of(take()?)?;
+        let patch = Patch::of(take()?)?;
+        let stretch = take()?.as_chunks::<STRETCHES>().0.to_vec();
+        let fits = stretch.len() == patch.ids.len();
+        let store = fits.then_some(Store { patch, stretch })?;
         let moves = take()?.as_chunks::<NUMBERS>().0.iter().map(Move::of);
         let moves = moves.collect::<Option<_>>()?;
-        let sides = [take()?.try_into().ok()?, take()?.try_into().ok()?];
+        let mut of_sides = || take()?.try_into().ok();
+        let [resting, returns, refusing] = [of_sides()?, of_sides()?, of_sides()?];
         let &[refused, usual, deepest, farthest] = take()? else {
             return None;
         };
         Some(Self {
             store,
             moves,
-            resting: sides[0],
-            returns: sides[1],
+            resting,
+            returns,
+            refusing,
             refused,
             overlaps: Overlaps { usual, deepest },
             farthest,

@@ -79,6 +79,7 @@ impl Bowl {
         self.journey.write(&mut put);
         put(&self.layout.zone.corners());
         put(&[self.start_volume]);
+        put(self.unborne.as_slice());
         continuum::write(self.flow.state(), &mut put);
     }
 
@@ -129,7 +130,9 @@ impl Bowl {
         let Some(journey) = Journey::read(&mut take) else {
             return Ok(None);
         };
-        let (Some(&[x, y, z, high_x, high_y]), Some(&[start_volume])) = (take(), take()) else {
+        let (Some(&[x, y, z, high_x, high_y]), Some(&[start_volume]), Some(&[u, v, w])) =
+            (take(), take(), take())
+        else {
             return Ok(None);
         };
         let Some(state) = continuum::read(&mut take) else {
@@ -147,9 +150,20 @@ impl Bowl {
             return Ok(None);
         }
         let cells = bowl.layout.cells;
-        bowl.take_zone(Zone::new(&cells, [low_x, low_y, low_z], [high_x, high_y]));
+        let zone = Zone::new(&cells, [low_x, low_y, low_z], [high_x, high_y]);
+        let filled = cells.counts[2] - super::ROOM;
+        let left = |axis: usize| zone.inside(axis, filled, bowl.layout.widths[1]);
+        if let Some(axis) = (0..3).find(|axis| left(*axis) < 1.0) {
+            let name = ["x", "y", "z"][axis];
+            return Err(OverlapError::Record(format!(
+                "the bowl's memory has a box with {} cells along {name} beyond its overlap; at least 1 is needed",
+                left(axis)
+            )));
+        }
+        bowl.take_zone(zone);
         bowl.journey = journey;
         bowl.start_volume = start_volume;
+        bowl.unborne = Vector3::new(u, v, w);
         let cells = cells.count();
         let (layer, faces) = (
             bowl.layout.cells.counts[0] * bowl.layout.cells.counts[1],

@@ -20,13 +20,17 @@ mod cells;
 mod continuum;
 mod copy;
 mod exchange;
+mod gradients;
 mod growth;
 mod journey;
 mod memory;
+mod oracle;
+mod returning;
 mod room;
 #[cfg(test)]
 mod rotation;
 mod settlement;
+mod store;
 mod watch;
 mod zone;
 
@@ -42,10 +46,11 @@ use cells::Sums;
 use colluvium_continuum::free_surface::{Outside, SpaceFields, SpaceFlow, SurfaceOptions};
 use colluvium_continuum::rheology::MuI;
 use colluvium_continuum::units::Units;
+use colluvium_dem::preparation::ShearedCell;
 use colluvium_dem::{GrainSample, Simulation};
 use continuum::View;
 use journey::Journey;
-use nalgebra::Vector3;
+use nalgebra::{Matrix3, Vector3};
 use zone::Faces;
 
 /// Faces with less than this of a full shell hand on what presses on them: a force on few grains throws them out.
@@ -268,9 +273,15 @@ pub struct Bowl {
     laid_at: u64,
     /// Impulse that the continuum has still to take from the relaxation (N s).
     owed: Vec<Vector3<f64>>,
+    /// Momentum of moves of the box that no cell was there to give back yet (N s).
+    unborne: Vector3<f64>,
     /// How far grains have moved outwards through each face of the box (m).
     moved: Vec<f64>,
     journey: Journey,
+    /// Packings in steady shear, for what has been sheared while it was stored.
+    packings: Vec<ShearedCell>,
+    /// L of all cells after the last exchange (1/s), of a box that grows.
+    gradients: Vec<Matrix3<f64>>,
     account: Account,
     monitors: Monitors,
     /// Steps for which loads are held, how often until an exchange, and how often since the last one.
@@ -365,8 +376,11 @@ impl Bowl {
             given: Given::nothing(count),
             laid_at: simulation.steps_done(),
             owed: vec![Vector3::zeros(); count],
+            unborne: Vector3::zeros(),
             moved: Vec::new(),
             journey: Journey::default(),
+            packings: Vec::new(),
+            gradients: vec![Matrix3::zeros(); count],
             account: Account::default(),
             monitors: Monitors::default(),
             steps_of_loads,
@@ -473,8 +487,8 @@ impl Bowl {
         let time = self.acting(simulation);
         let forces = self.laid.relaxation.iter().zip(&self.given.relaxation);
         let all = self.owed.iter().zip(forces);
-        all.map(|(owed, (laid, given))| owed - given - laid * time)
-            .sum()
+        let owed = all.map(|(owed, (laid, given))| owed - given - laid * time);
+        owed.sum::<Vector3<f64>>() - self.unborne
     }
 
     /// What the monitors have seen.

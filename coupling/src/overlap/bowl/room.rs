@@ -121,6 +121,31 @@ pub(super) fn make_room(
     room
 }
 
+/// Which grains overlap one that is there, or one before them that does not, deeper than this over the sum of radii.
+pub(super) fn too_deep(grains: &[Grain], there: &[Ball], most: f64) -> Vec<bool> {
+    let own = grains.iter().enumerate();
+    let own = own.map(|(k, g)| (g.position, g.radius, Some(k)));
+    let others = there.iter().map(|(at, radius)| (*at, *radius, None));
+    let entry = |(at, radius, number): (Vector3<f64>, f64, Option<usize>)| {
+        GeomWithData::new(<[f64; 3]>::from(at), (radius, number))
+    };
+    let all: Vec<_> = others.chain(own).map(entry).collect();
+    let largest = all.iter().map(|ball| ball.data.0).fold(0.0, f64::max);
+    let tree = RTree::bulk_load(all);
+    let mut goes = vec![false; grains.len()];
+    for (k, grain) in grains.iter().enumerate() {
+        let reach = (grain.radius + largest).powi(2);
+        let mut near = tree.locate_within_distance(grain.position.into(), reach);
+        goes[k] = near.any(|entry| {
+            let (radius, number) = entry.data;
+            let way = (Vector3::from(*entry.geom()) - grain.position).norm();
+            let counts = number.is_none_or(|n| n < k && !goes[n]);
+            counts && way < (1.0 - most) * (grain.radius + radius)
+        });
+    }
+    goes
+}
+
 #[cfg(test)]
 mod tests {
     use super::*;
@@ -151,6 +176,17 @@ mod tests {
         let settled = grains.clone();
         let again = make_room(&mut grains, &there, allowed, |_, _| ());
         assert!(again.moved == 0.0 && grains == settled);
+    }
+
+    #[test]
+    fn of_two_that_lie_too_deep_the_later_one_is() {
+        let at = |x: f64| Grain::at_rest(Vector3::new(x, 0.0, 0.0), 0.5, 1.0);
+        let grains = [at(0.7), at(0.85), at(1.6), at(2.55)];
+        let there = [(Vector3::zeros(), 0.5)];
+        // In one that is there; in the one before, which goes; in none; less deep than asked for.
+        let goes = too_deep(&grains, &there, 0.2);
+        assert_eq!(goes, [true, false, true, false]);
+        assert_eq!(too_deep(&grains, &there, 0.01), [true, true, false, true]);
     }
 
     #[test]

@@ -76,6 +76,17 @@ impl Bowl {
         let paid = self.pay(remainder)?;
         self.account.carried += remainder - paid;
         let momentum = self.counted().1 - before.1;
+        self.account.settled += momentum;
+        self.unborne += momentum;
+        self.bear();
+        Ok(remainder)
+    }
+
+    /// Lets the continuum's cells of the buffer give back what moves of the box added to momenta; without any it waits.
+    pub(super) fn bear(&mut self) {
+        if self.unborne == Vector3::zeros() {
+            return;
+        }
         let handshake = self.layout.widths[0];
         let (cells, zone) = (&self.layout.cells, &self.layout.zone);
         let bears = |cell: &usize| {
@@ -83,14 +94,14 @@ impl Bowl {
             label > 0.0 && label < handshake && self.view.is_full(*cell)
         };
         let bearers: Vec<usize> = (0..cells.count()).filter(bears).collect();
-        if !bearers.is_empty() {
-            let each = momentum / bearers.len() as f64;
-            for &cell in &bearers {
-                self.owed[cell] -= each;
-                self.account.settled += each;
-            }
+        if bearers.is_empty() {
+            return;
         }
-        Ok(remainder)
+        let each = self.unborne / bearers.len() as f64;
+        for cell in bearers {
+            self.owed[cell] -= each;
+        }
+        self.unborne = Vector3::zeros();
     }
 
     /// Takes a mass (kg) off the surface of the continuum that counts, evenly; says how much it had to take off.
@@ -103,28 +114,75 @@ impl Bowl {
         }
         let before = self.flow.volume();
         let mut state = self.flow.state().clone();
-        let each = mass / (self.full() * columns.len() as f64);
-        for column in columns {
-            let rows = (0..cells.counts[2]).map(|k| column + layer * k);
-            let filled = rows.rev().find(|cell| state.fractions[*cell] > 0.0);
-            let Some(mut cell) = filled else { continue };
-            let mut left = state.fractions[cell] - each;
-            while left < 0.0 && cell >= layer {
-                state.fractions[cell] = 0.0;
-                cell -= layer;
-                left += state.fractions[cell];
-            }
-            while left > 1.0 && cell + layer < state.fractions.len() {
-                state.fractions[cell] = 1.0;
-                cell += layer;
-                left -= 1.0;
-            }
-            state.fractions[cell] = left;
-        }
+        take_off(&mut state.fractions, layer, columns, mass / self.full());
         self.flow.set_state(state)?;
         let change = self.flow.volume() - before;
         self.account.copied += change;
         self.view.look(&self.flow, &self.layout.cells, &self.units);
         Ok(-change * self.spec.density() * self.units.length.powi(3))
+    }
+}
+
+/// Takes an amount (in full cells) off the surface of columns of cells, evenly, or adds it if negative; what a column has not,
+/// or has no room for, the others give or take. Says what none of them could.
+fn take_off(fractions: &mut [f64], layer: usize, mut columns: Vec<usize>, mut amount: f64) -> f64 {
+    while !columns.is_empty() && amount != 0.0 {
+        let each = amount / columns.len() as f64;
+        amount = 0.0;
+        columns.retain(|column| {
+            let over = take_off_column(fractions, layer, *column, each);
+            amount += over;
+            over == 0.0
+        });
+    }
+    amount
+}
+
+/// The same of one column.
+fn take_off_column(fractions: &mut [f64], layer: usize, column: usize, each: f64) -> f64 {
+    let rows = (0..fractions.len() / layer).map(|k| column + layer * k);
+    let filled = rows.rev().find(|cell| fractions[*cell] > 0.0);
+    let mut cell = filled.unwrap_or(column);
+    let mut left = fractions[cell] - each;
+    while left < 0.0 && cell >= layer {
+        fractions[cell] = 0.0;
+        cell -= layer;
+        left += fractions[cell];
+    }
+    while left > 1.0 && cell + layer < fractions.len() {
+        fractions[cell] = 1.0;
+        cell += layer;
+        left += fractions[cell] - 1.0;
+    }
+    fractions[cell] = left.clamp(0.0, 1.0);
+    fractions[cell] - left
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Two columns side by side, three cells high.
+    const COLUMNS: [f64; 6] = [1.0, 1.0, 0.5, 1.0, 0.0, 0.5];
+
+    #[test]
+    fn what_a_column_has_not_the_others_give() {
+        let mut fractions = COLUMNS;
+        assert_eq!(take_off(&mut fractions, 2, vec![0, 1], 1.0), 0.0);
+        assert_eq!(fractions, [1.0, 1.0, 0.0, 1.0, 0.0, 0.0]);
+        // The first has one cell left, the second two.
+        assert_eq!(take_off(&mut fractions, 2, vec![0, 1], 2.5), 0.0);
+        assert_eq!(fractions, [0.0, 0.5, 0.0, 0.0, 0.0, 0.0]);
+        assert_eq!(take_off(&mut fractions, 2, vec![0, 1], 2.0), 1.5);
+        assert_eq!(fractions, [0.0; 6]);
+    }
+
+    #[test]
+    fn what_a_column_has_no_room_for_the_others_take() {
+        let mut fractions = COLUMNS;
+        assert_eq!(take_off(&mut fractions, 2, vec![0, 1], -1.5), 0.0);
+        assert_eq!(fractions, [1.0, 1.0, 1.0, 1.0, 0.5, 1.0]);
+        let over = take_off(&mut fractions, 2, vec![0, 1], -1.5);
+        assert_eq!((over, fractions), (-1.0, [1.0; 6]));
     }
 }

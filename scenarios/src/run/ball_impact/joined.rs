@@ -5,9 +5,10 @@
 
 use super::super::surface_fields::space_frame;
 use super::super::world::{Course, Expected, Ran, Recipe, as_the_scene};
-use super::moves;
+use super::{moves, sheared_packings};
 use crate::failure::Failure;
 use crate::rheology_file::RheologyFile;
+use crate::run_directory::RunDirectory;
 use crate::scene::world::Materials;
 use crate::scene::{BallImpactScene, DENSE};
 use crate::state_hash;
@@ -17,8 +18,8 @@ use crate::vtkhdf::Frame;
 use colluvium_continuum::free_surface::SurfaceOptions;
 use colluvium_continuum::rheology::MuI;
 use colluvium_coupling::overlap::OverlapError;
-use colluvium_coupling::overlap::bowl::{Bowl, BowlSpec};
-use colluvium_dem::preparation::solid_fraction;
+use colluvium_coupling::overlap::bowl::{Bowl, BowlSpec, Growth};
+use colluvium_dem::preparation::{ShearedCell, solid_fraction};
 use colluvium_dem::{Simulation, Snapshot};
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
@@ -34,6 +35,8 @@ pub struct JoinedBed<'a> {
     scene: &'a BallImpactScene,
     origin: String,
     live: Mutex<Option<Bowl>>,
+    /// Packings in steady shear.
+    packings: Mutex<Vec<ShearedCell>>,
 }
 
 impl std::fmt::Debug for JoinedBed<'_> {
@@ -74,21 +77,24 @@ impl<'a> JoinedBed<'a> {
             scene,
             origin: origin.to_owned(),
             live: Mutex::new(None),
+            packings: Mutex::new(Vec::new()),
         }
     }
 
     /// The law of the continuum at a solid fraction.
-    fn law(&self, solid_fraction: f64) -> Result<MuI, Failure> {
+    /// And the inertial number up to which it was measured.
+    fn law(&self, solid_fraction: f64) -> Result<(MuI, f64), Failure> {
         let keys = &self.scene.continuum;
         let materials = self.scene.materials(&self.origin)?;
-        let calibrated = match keys.calibrated.word() {
+        let (calibrated, valid) = match keys.calibrated.word() {
             Some(word) => {
                 let file = RheologyFile::read(Path::new(word))?;
-                [file.mu_s, file.mu_2, file.i_0]
+                let valid = file.valid_i.map_or(f64::INFINITY, |[_, high]| high);
+                ([file.mu_s, file.mu_2, file.i_0], valid)
             }
-            None => [f64::NAN; 3],
+            None => ([f64::NAN; 3], f64::INFINITY),
         };
-        Ok(MuI {
+        let law = MuI {
             mu_s: keys.mu_s.unwrap_or(calibrated[0]),
             mu_2: keys.mu_2.unwrap_or(calibrated[1]),
             i_0: keys.i_0.unwrap_or(calibrated[2]),
@@ -96,13 +102,14 @@ impl<'a> JoinedBed<'a> {
             solid_fraction,
             grain_density: self.scene.grain_density(&materials),
             cohesion: 0.0,
-        })
+        };
+        Ok((law, valid))
     }
 
     /// What the bed is joined from, at a solid fraction and with its surface at a height (m).
     fn spec(&self, [solid, surface]: [f64; HEAD], ball: u32) -> Result<BowlSpec, Failure> {
         let scene = self.scene;
-        let law = self.law(solid)?;
+        let (law, valid) = self.law(solid)?;
         let size = [scene.container.length, scene.container.width].map(|e| scene.scale * e);
         let half = scene.half_width(law.diameter);
         let settings = scene.overlap_settings(&self.origin)?;
@@ -113,7 +120,7 @@ impl<'a> JoinedBed<'a> {
             options: SurfaceOptions::default(),
             half: [half; 2],
             bottom: (surface - scene.zone_depth(law.diameter) - scene.floor()).max(0.0),
-            growth: scene.growth(law.diameter, &settings),
+            growth: scene.growth(law.diameter, &settings, valid),
             settings,
             ball: Some(ball),
             law,
@@ -128,7 +135,15 @@ impl<'a> JoinedBed<'a> {
         let damaged = || Failure::Input("--resume: the checkpoint is damaged: recipe/state".into());
         let (head, rest) = memory.split_first_chunk::<HEAD>().ok_or_else(damaged)?;
         let spec = self.spec(*head, last(simulation))?;
-        Bowl::read(spec, rest, simulation).map_err(|why| self.failure(why))
+        let bowl = Bowl::read(spec, rest, simulation).map_err(|why| self.failure(why))?;
+        Ok(self.stocked(bowl))
+    }
+
+    /// The bowl with the packings that it takes grains from.
+    fn stocked(&self, mut bowl: Bowl) -> Bowl {
+        let packings = self.packings.lock();
+        bowl.set_packings(packings.unwrap_or_else(PoisonError::into_inner).clone());
+        bowl
     }
 
     /// Cuts the bed.
@@ -141,7 +156,7 @@ impl<'a> JoinedBed<'a> {
         let head = [solid, self.scene.surface(&bed)];
         let bowl =
             Bowl::cut(self.spec(head, ball)?, simulation).map_err(|why| self.failure(why))?;
-        Ok((head, bowl))
+        Ok((head, self.stocked(bowl)))
     }
 
     fn remember(head: &[f64], bowl: &Bowl, state: &mut Vec<f64>) {
@@ -149,6 +164,31 @@ impl<'a> JoinedBed<'a> {
         memory.extend(head);
         bowl.write(&mut memory);
         *state = memory;
+    }
+
+    /// What else a side goes outwards for, and what comes back.
+    fn strips(&self, growth: &Growth) -> String {
+        let scene = self.scene;
+        let limit = |value: f64, key: &str| match value.is_finite() {
+            true => format!("{value:.3} ({key})"),
+            false => format!("none ({key} left out)"),
+        };
+        let back = match scene.returns_sheared() {
+            true => format!(
+                "there grains of packings come in their place: {} of {} grains each, sheared before the run at I of {:?} under two \
+                 pressures (zones.returning, zones.sheared_inertial, zones.sheared_grains)",
+                2 * scene.sheared_inertial().len(),
+                scene.sheared_grains(),
+                scene.sheared_inertial(),
+            ),
+            false => "stored grains come back where the continuum has carried them".into(),
+        };
+        format!(
+            "a side goes outwards, too, where the continuum beside it is sheared faster than I = {}, or what is stored there has been \
+             sheared by more than {}; {back}",
+            limit(growth.fastest, "zones.fastest_inertial"),
+            limit(growth.misplaced, "zones.misplaced_shear"),
+        )
     }
 
     /// Height of the bed (m), before it is there to be measured.
@@ -204,6 +244,21 @@ impl Recipe for JoinedBed<'_> {
         spec.check(height).map_err(|why| self.failure(why))
     }
 
+    fn stock(
+        &self,
+        materials: &Materials,
+        timestep: f64,
+        directory: &RunDirectory,
+    ) -> Result<(), Failure> {
+        if self.scene.returns_sheared() {
+            let depth = self.expected_height(self.scene.grain_diameter(materials));
+            let wanted = sheared_packings::wanted(self.scene, materials, depth, timestep);
+            let made = sheared_packings::packings(&wanted, &self.origin, directory)?;
+            *self.packings.lock().unwrap_or_else(PoisonError::into_inner) = made;
+        }
+        Ok(())
+    }
+
     fn expected(&self, materials: &Materials) -> Expected {
         let all = self.scene.expected(materials);
         Expected {
@@ -254,7 +309,8 @@ impl Recipe for JoinedBed<'_> {
                 100.0 * self.expected_shares()[0]
             ),
         ));
-        if let Some(growth) = scene.growth(d, &s) {
+        let valid = self.law(DENSE).map_or(f64::INFINITY, |(_, valid)| valid);
+        if let Some(growth) = scene.growth(d, &s, valid) {
             let travel = &growth.travel;
             let most = match scene.zones.budget {
                 Some(most) => format!("never to more than {most} grains (zones.budget)"),
@@ -276,6 +332,7 @@ impl Recipe for JoinedBed<'_> {
                     100.0 * self.expected_shares()[1]
                 ),
             ));
+            lines.push(("strips".into(), self.strips(&growth)));
         }
         lines.push((
             "overlap".into(),

@@ -22,11 +22,20 @@ pub(super) fn table(bowl: &Bowl, summary: &mut Summary) -> Option<Table> {
         let of = all.iter().filter(|m| m.side == side);
         format!("{} {}", SIDES[side], of.count())
     };
-    let reasons = [Reason::Ball, Reason::Speed, Reason::Rest].map(because);
+    let reasons = [
+        Reason::Ball,
+        Reason::Speed,
+        Reason::Inertial,
+        Reason::Misplaced,
+        Reason::Rest,
+    ]
+    .map(because);
     let sides = [0, 1, 2, 3, 4].map(of_side);
     let displaced: f64 = all.iter().map(|m| m.displaced).sum();
+    let replaced: f64 = all.iter().map(|m| m.replaced).sum();
     summary.remarks.push(format!(
-        "The box moved {} times ({}; {}): {:.4} kg became grains and {:.4} kg continuum; {displaced} grains were moved to make room.",
+        "The box moved {} times ({}; {}): {:.4} kg became grains and {:.4} kg continuum; {displaced} grains were moved to make room, {replaced} came from \
+         sheared packings.",
         all.len(),
         reasons.join(", "),
         sides.join(", "),
@@ -35,7 +44,7 @@ pub(super) fn table(bowl: &Bowl, summary: &mut Summary) -> Option<Table> {
     ));
     if bowl.refused_moves() > 0.0 {
         summary.remarks.push(format!(
-            "At {} exchanges a move outwards was refused: zones.budget is too small for what the box needs, or it would have filled the container.",
+            "Refused moves outwards: {}: zones.budget is too small for what the box needs, or it would have filled the container.",
             bowl.refused_moves()
         ));
     }
@@ -48,12 +57,17 @@ pub(super) fn table(bowl: &Bowl, summary: &mut Summary) -> Option<Table> {
         (
             "refused_moves",
             bowl.refused_moves(),
-            "exchanges at which zones.budget or the walls did not allow a side's move",
+            "moves outwards that zones.budget or the walls did not allow; one wanted for many exchanges counts once",
         ),
         (
             "displaced",
             displaced,
             "grains that were moved to make room for them among others",
+        ),
+        (
+            "replaced",
+            replaced,
+            "grains of sheared packings that came in the place of stored ones",
         ),
     ] {
         summary.put(name, Quantity::new(value, "1").from(source));
@@ -64,10 +78,11 @@ pub(super) fn table(bowl: &Bowl, summary: &mut Summary) -> Option<Table> {
         .with("side", "1", column(|m| m.side as f64))
         .with("place", "m", column(|m| m.place))
         .with("reason", "1", column(|m| m.reason.number() as f64))
-        .with("value", "m or m/s", column(|m| m.value))
+        .with("value", "m, m/s or 1", column(|m| m.value))
         .with("mass", "kg", column(|m| m.mass))
         .with("grains", "1", column(|m| m.grains))
         .with("displaced", "1", column(|m| m.displaced))
+        .with("replaced", "1", column(|m| m.replaced))
         .with("remainder", "kg", column(|m| m.remainder));
     (!all.is_empty()).then_some(table)
 }

@@ -193,6 +193,11 @@ pub fn run(recipe: &dyn Recipe, under: &mut Under) -> Result<Findings, Failure> 
     if again {
         under.begin()?;
     }
+    let stocked = recipe.stock(&materials, stand.setup.timestep, under.directory);
+    if crate::interruption::requested() {
+        return Err(under.interrupted());
+    }
+    stocked?;
     let clock = Instant::now();
     let bodies = stand.world.bodies.clone();
     let pictures = Pictures::new(recipe, &materials, &bodies, under.directory);

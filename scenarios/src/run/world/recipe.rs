@@ -4,6 +4,7 @@ use super::build::World;
 use super::course::Ran;
 use super::workshop::Workshop;
 use crate::failure::Failure;
+use crate::run_directory::RunDirectory;
 use crate::scene::LawKeys;
 use crate::scene::world::{Materials, OutputKeys, StepKeys};
 use crate::summary::Summary;
@@ -77,6 +78,16 @@ pub trait Recipe: Debug + Sync {
 
     /// Whether what only this recipe knows of fits together, before anything is written.
     fn check(&self) -> Result<(), Failure> {
+        Ok(())
+    }
+
+    /// Makes what the run needs beside its packing, of this step (s), and keeps it in the run's directory; or reads it there.
+    fn stock(
+        &self,
+        _materials: &Materials,
+        _timestep: f64,
+        _directory: &RunDirectory,
+    ) -> Result<(), Failure> {
         Ok(())
     }
 
