@@ -57,7 +57,7 @@ fn setup(grains: Vec<Grain>) -> Setup {
 }
 
 /// A bed that rests, with the springs that hold it.
-fn rested() -> Simulation {
+pub fn rested() -> Simulation {
     static BED: OnceLock<(Vec<Grain>, Record)> = OnceLock::new();
     let (grains, record) = BED.get_or_init(|| {
         let radius = RadiusLaw::Uniform {
@@ -100,7 +100,7 @@ fn calm(simulation: &mut Simulation) {
 }
 
 /// No side moves by itself.
-const TRAVEL: Travel = Travel {
+pub const TRAVEL: Travel = Travel {
     width: 2.0,
     rest: 0.0,
     wake: 10.0,
@@ -109,7 +109,7 @@ const TRAVEL: Travel = Travel {
     fewest: 20.0,
 };
 
-fn spec(simulation: &mut Simulation, travel: Travel) -> BowlSpec {
+pub fn spec(simulation: &mut Simulation, travel: Travel) -> BowlSpec {
     let grains = simulation.grain_list();
     let middle = Region::Block {
         lower: Vector3::new(2.0, 2.0, 1.5),
@@ -196,7 +196,7 @@ impl Bed {
 
 /// Mean stresses σ_xx and σ_zz of grains' contacts, compression positive, between two places along x and well below the
 /// surface.
-fn stresses(simulation: &mut Simulation, [low, high]: [f64; 2]) -> [f64; 2] {
+pub fn stresses(simulation: &mut Simulation, [low, high]: [f64; 2]) -> [f64; 2] {
     let mut seen = Snapshot::default();
     simulation.snapshot(&mut seen);
     let mut sums = [0.0; 2];

@@ -15,4 +15,5 @@ mod material;
 mod motion;
 mod pulse;
 mod rest;
+mod rest_pressure;
 mod world;
