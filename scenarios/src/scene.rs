@@ -59,7 +59,7 @@ pub use collapse::{
 };
 pub use collapse_grains::{CalibratedKind, ColumnFloorKind, ColumnGrainKeys};
 pub use collapse_terrain::{ContactKind, TerrainKeys};
-pub use collapse_zones::{ColumnOverlapKeys, ColumnZoneKeys, DENSE};
+pub use collapse_zones::{ColumnOverlapKeys, ColumnZoneKeys, DENSE, overlap_words};
 pub use comet::{CometBlockKeys, CometKeys, MixKind, Softness};
 pub use contact::SurfaceKeys;
 pub use cylinder::{CylinderGrid, CylinderScene};

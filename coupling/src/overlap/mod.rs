@@ -33,6 +33,7 @@ mod ledger;
 pub mod material_edge;
 mod monitors;
 mod record;
+mod rest_stress;
 mod settings;
 mod shell;
 mod sighting;

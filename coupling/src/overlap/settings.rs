@@ -4,6 +4,9 @@ use serde::{Deserialize, Serialize};
 
 use super::OverlapError;
 
+/// Shear strain in which sideways pressure at rest is forgotten.
+const REST_STRAIN: f64 = 0.01;
+
 /// How stresses of grains are smoothed along the normal, beyond the mean over a layer of one cell.
 #[derive(Debug, Clone, Copy, PartialEq, Default, Serialize, Deserialize)]
 #[serde(rename_all = "kebab-case")]
@@ -61,6 +64,9 @@ pub struct OverlapSettings {
     pub impedance: Option<f64>,
     /// Motion of the continuum along the normal: riding where its far end is free, held where it is not.
     pub normal_motion: Option<NormalMotion>,
+    /// Shear strain after which the continuum has forgotten how the grains pressed sideways at rest, γ_c (see
+    /// `rest_stress.rs`); nothing is remembered at 0. 0.01. Boxes in beds alone remember.
+    pub rest_strain: Option<f64>,
     /// Neither side acts on the other: grains end at a free surface, and the continuum slides on nothing. This is
     /// what a coupling has to do better than.
     pub uncoupled: bool,
@@ -118,6 +124,8 @@ pub struct Resolved {
     pub impedance: f64,
     /// Motion along the normal.
     pub normal_motion: NormalMotion,
+    /// Strain that wipes the stress at rest out.
+    pub rest_strain: f64,
     /// Neither side acts on the other.
     pub uncoupled: bool,
 }
@@ -166,6 +174,7 @@ impl OverlapSettings {
             } else {
                 NormalMotion::Held
             }),
+            rest_strain: self.rest_strain.unwrap_or(REST_STRAIN),
             uncoupled: self.uncoupled,
         };
         let r = &resolved;
@@ -182,6 +191,12 @@ impl OverlapSettings {
         ] {
             check(key, value, value > 0.0, "positive")?;
         }
+        check(
+            "rest_strain",
+            r.rest_strain,
+            r.rest_strain >= 0.0,
+            "at least 0",
+        )?;
         check(
             "impedance",
             r.impedance,

@@ -15,5 +15,6 @@ mod material;
 mod motion;
 mod pulse;
 mod rest;
+mod rest_pressure;
 mod sheared;
 mod world;

@@ -120,6 +120,11 @@ pub struct ColumnOverlapKeys {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 0.0, "maximum" = 1.0e15))]
     pub impedance: Option<f64>,
+    /// With a box in a bed: shear strain after which the continuum has forgotten how its grains pressed sideways at rest (K_0);
+    /// 0.01 if left out, 0 for a continuum that presses sideways as μ(I) has it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("minimum" = 0.0, "maximum" = 1000.0))]
+    pub rest_strain: Option<f64>,
     /// Neither side acts on the other: what a coupling has to do better than.
     #[serde(default)]
     pub uncoupled: bool,
@@ -140,11 +145,29 @@ impl ColumnOverlapKeys {
             exchange_time: self.exchange_time,
             load_time: self.load_time,
             impedance: self.impedance,
+            rest_strain: self.rest_strain,
             normal_motion: Some(NormalMotion::Held),
             uncoupled: self.uncoupled,
             ..OverlapSettings::default()
         }
     }
+}
+
+/// An overlap in words, for grains of this diameter (m).
+pub fn overlap_words(s: &Resolved, d: f64) -> String {
+    format!(
+        "shell {:.1} d, buffer {:.1} d, inner overlap {:.1} d; loads held {:.2e} s, exchange every {:.2e} s, stresses averaged over \
+         {:.2e} s, relaxation {:.2e} s, following {:.2e} s, impedance {:.3e} Pa s/m",
+        s.shell / d,
+        s.buffer / d,
+        s.inner / d,
+        s.load_time,
+        s.exchange_time,
+        s.stress_time,
+        s.relaxation_time,
+        s.following_time,
+        s.impedance
+    )
 }
 
 /// Relaxation and following times over √(d/g): with 1 of it, as on an incline, the continuum behind a heap that has
@@ -280,6 +303,10 @@ impl CollapseScene {
                 least * h + overlap + LEAST_GRAINS * d
             );
             return Err(at("").refuse("aspect", self.aspect, &range));
+        }
+        if let Some(strain) = self.overlap.rest_strain {
+            let range = "left out: what lies behind the edge of a column yields at once, and has no rest to remember";
+            return Err(at("overlap").refuse("rest_strain", strain, range));
         }
         let zones = &self.zones;
         if zones.budget.is_some() && zones.tolerance.is_none() && !zones.moving {

@@ -127,6 +127,7 @@ impl OverlapKeys {
                 NormalMotionKind::Held => NormalMotion::Held,
                 NormalMotionKind::Riding => NormalMotion::Riding,
             }),
+            rest_strain: None,
             uncoupled: self.uncoupled,
         }
     }

@@ -114,7 +114,7 @@ pub struct Monitors {
     pub slip: f64,
     /// Largest of these (m/s).
     pub largest_slip: f64,
-    /// Σ of the normal force of the grains' stress through the handshake surface, and of the continuum's (N).
+    /// Σ of the normal force of the contacts that cross the handshake surface, and of the continuum's stress (N).
     pub force: [f64; 2],
     /// Σ |impulse| of the relaxation, cell by cell, and of the traction, face by face (N s).
     pub impulse: [f64; 2],
@@ -174,7 +174,7 @@ impl Monitors {
         self.slip / self.exchanges.max(1.0)
     }
 
-    /// Normal force of the grains' stress over that of the continuum's at the handshake surface.
+    /// Normal force of the grains' contacts over that of the continuum's at the handshake surface.
     pub fn force_ratio(&self) -> f64 {
         self.force[0] / self.force[1]
     }

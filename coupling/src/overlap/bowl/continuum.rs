@@ -2,9 +2,10 @@
 
 use super::cells::Cells;
 use crate::overlap::OverlapError;
+use crate::overlap::rest_stress::RestStress;
 use colluvium_continuum::free_surface::{SpaceFlow, SpaceState, SurfaceOptions};
 use colluvium_continuum::grid::{Axis, Boundary, Grid};
-use colluvium_continuum::rheology::{MuI, Rheology};
+use colluvium_continuum::rheology::{MuI, Rheology, strain_rate_norm};
 use colluvium_continuum::strain::deviator;
 use colluvium_continuum::units::Units;
 use nalgebra::{Matrix3, Vector3};
@@ -54,11 +55,13 @@ pub struct View {
     pub velocity: Vec<Vector3<f64>>,
     /// σ, positive in tension; of a cell at the surface at its filled part's mean (Pa).
     pub stress: Vec<Matrix3<f64>>,
+    /// What is remembered of the grains' rest; in `stress`.
+    pub rest: RestStress,
 }
 
 impl View {
-    /// Looks at a flow.
-    pub fn look(&mut self, flow: &SpaceFlow<MuI>, cells: &Cells, units: &Units) {
+    /// Looks at a flow, a time (s) after it was looked at before: 0 where nothing has moved since.
+    pub fn look(&mut self, flow: &SpaceFlow<MuI>, cells: &Cells, units: &Units, dt: f64) {
         let state = flow.state();
         let points = state.stress.len() / state.fractions.len();
         let [nx, ny, _] = cells.counts;
@@ -97,6 +100,34 @@ impl View {
                 units.stress() * Matrix3::new(xx, s[2], s[3], s[2], yy, s[4], s[3], s[4], zz),
             );
         }
+        for cell in (0..cells.count()).filter(|_| dt > 0.0) {
+            self.rest.strain[cell] += self.shear_rate(cells, cell) * dt;
+        }
+        for cell in (0..cells.count()).filter(|cell| state.fractions[*cell] > FULL) {
+            let stress = &mut self.stress[cell];
+            *stress += sideways(self.rest.beyond(cell, stress[(2, 2)]));
+        }
+    }
+
+    /// γ̇ of a cell, from the mean velocities of full cells beside it (1/s).
+    fn shear_rate(&self, cells: &Cells, cell: usize) -> f64 {
+        let index = cells.index(cell);
+        let mut gradient = Matrix3::zeros();
+        for axis in 0..3 {
+            let beside = |by: isize| {
+                let mut at = index;
+                at[axis] = at[axis].checked_add_signed(by)?;
+                let inside = at[axis] < cells.counts[axis];
+                inside
+                    .then(|| cells.cell(at))
+                    .filter(|&cell| self.is_full(cell))
+            };
+            let [low, high] = [-1, 1].map(beside);
+            let apart = f64::from(u8::from(low.is_some()) + u8::from(high.is_some()));
+            let [a, b] = [low, high].map(|end| self.velocity[end.unwrap_or(cell)]);
+            gradient.set_column(axis, &((b - a) / (apart.max(1.0) * cells.spacing[axis])));
+        }
+        strain_rate_norm(components(&(gradient + gradient.transpose())).0)
     }
 
     /// Whether a cell has a pressure of its own.
@@ -125,6 +156,11 @@ impl View {
             (share * fraction, share * stress, share * velocity)
         })
     }
+}
+
+/// A stress that is the same in both horizontal directions (Pa).
+pub fn sideways(stress: f64) -> Matrix3<f64> {
+    Matrix3::from_diagonal(&Vector3::new(stress, stress, 0.0))
 }
 
 /// The components of a stress as [`colluvium_continuum::strain`] has them, and its pressure (Pa).

@@ -73,7 +73,8 @@ impl Bowl {
         self.flow
             .renew_step(self.exchange_time() / self.units.time());
         self.account.copied += self.flow.volume() - before;
-        self.view.look(&self.flow, &self.layout.cells, &self.units);
+        self.view
+            .look(&self.flow, &self.layout.cells, &self.units, 0.0);
         Ok(())
     }
 }

@@ -1,7 +1,7 @@
 //! The steps: grains under what is held, and the exchange that follows so many of them.
 
 use super::cells::over;
-use super::continuum::components;
+use super::continuum::{components, sideways};
 use super::{Bowl, OverlapError};
 use colluvium_dem::{GrainSample, Load, Simulation};
 use nalgebra::Vector3;
@@ -218,7 +218,9 @@ impl Bowl {
             let index = self.layout.cells.index(cell);
             let label = self.layout.zone.label_of_cell(index);
             let part = self.sums.cover[cell].mass / full;
-            let (deviatoric, pressure) = components(&self.sums.stress[cell]);
+            let stress_of_grains = &self.sums.stress[cell];
+            let beyond = self.view.rest.beyond(cell, stress_of_grains[(2, 2)]);
+            let (deviatoric, pressure) = components(&(stress_of_grains - sideways(beyond)));
             let outside = &mut self.outside;
             outside.pressure[cell] = (pressure * stress).max(0.0);
             outside.stress[cell] = deviatoric.map(|s| s * stress);
@@ -259,17 +261,21 @@ impl Bowl {
                 self.account.answer += answer;
             }
         }
-        self.view.look(&self.flow, &self.layout.cells, &self.units);
+        self.view
+            .look(&self.flow, &self.layout.cells, &self.units, dt);
         Ok(())
     }
 
     /// A step of the continuum that is taken back but for its stress and pressure, for grains to meet at once.
     pub(super) fn prime(&mut self) -> Result<(), OverlapError> {
-        self.view.look(&self.flow, &self.layout.cells, &self.units);
+        self.view
+            .look(&self.flow, &self.layout.cells, &self.units, 0.0);
         let before = self.flow.state().clone();
         let (account, monitors) = (self.account, self.monitors);
+        let rest = self.view.rest.clone();
         self.step_continuum(self.exchange_time(), 1)?;
         self.flow.set_state(before)?;
+        self.view.rest = rest;
         (self.account, self.monitors) = (account, monitors);
         Ok(())
     }

@@ -61,6 +61,8 @@ impl Bowl {
         put(&self.monitors.numbers());
         put(&self.columns);
         put(&self.moved);
+        put(&[self.view.rest.ratio]);
+        put(&self.view.rest.strain);
         let stress = self
             .sums
             .stress
@@ -119,11 +121,13 @@ impl Bowl {
             return Ok(None);
         };
         let rows = (|| {
-            let row = [take()?, take()?, take()?, take()?];
+            let row = [take()?, take()?, take()?, take()?, take()?, take()?];
             Some((row, [take()?, take()?, take()?, take()?]))
         })();
-        let Some(([columns, moved, stress, accelerations], [traction, velocity, owed, area])) =
-            rows
+        let Some((
+            [columns, moved, ratio, strain, stress, accelerations],
+            [traction, velocity, owed, area],
+        )) = rows
         else {
             return Ok(None);
         };
@@ -172,6 +176,8 @@ impl Bowl {
         let fits = memory[0] as usize == cells
             && columns.len() == layer
             && moved.len() == faces
+            && ratio.len() == 1
+            && strain.len() == cells
             && stress.len() == 6 * cells
             && accelerations.len() == 3 * cells
             && owed.len() == 3 * cells
@@ -188,6 +194,8 @@ impl Bowl {
         bowl.grain_mass = free_mass(simulation);
         bowl.columns = columns.to_vec();
         bowl.moved = moved.to_vec();
+        bowl.view.rest.ratio = ratio[0];
+        bowl.view.rest.strain = strain.to_vec();
         let stresses = stress.as_chunks::<6>().0.iter();
         bowl.sums.stress = stresses
             .map(|&[xx, yy, zz, xy, xz, yz]| Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
@@ -209,7 +217,8 @@ impl Bowl {
         }
         bowl.account = Account::of(account);
         bowl.flow.set_state(state)?;
-        bowl.view.look(&bowl.flow, &bowl.layout.cells, &bowl.units);
+        bowl.view
+            .look(&bowl.flow, &bowl.layout.cells, &bowl.units, 0.0);
         Ok(Some(bowl))
     }
 }

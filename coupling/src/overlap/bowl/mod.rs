@@ -40,6 +40,7 @@ pub use journey::{Growth, Move, Reason};
 pub use zone::Zone;
 
 use super::OverlapError;
+use super::rest_stress::RestStress;
 use super::settings::{Resolved, check};
 use super::sighting::{Sighting, free_mass};
 use cells::Sums;
@@ -313,6 +314,10 @@ impl Bowl {
         bowl.sighting = sighting;
         // Stresses as they are while all grains are still there.
         bowl.sum_up(1.0);
+        let sums = &bowl.sums.stress;
+        let total = sums.iter().sum::<nalgebra::Matrix3<f64>>();
+        let across = 0.5 * (total[(0, 0)] + total[(1, 1)]);
+        bowl.view.rest.measure(across, total[(2, 2)]);
         let (cells, zone) = (bowl.layout.cells, bowl.layout.zone.clone());
         let belongs = spec.belongs();
         let bed = bowl.sighting.snapshot.grains.iter().filter(|g| belongs(g));
@@ -331,7 +336,8 @@ impl Bowl {
         bowl.prime()?;
         bowl.agree();
         // What it was primed with is not its state.
-        bowl.view.look(&bowl.flow, &bowl.layout.cells, &bowl.units);
+        bowl.view
+            .look(&bowl.flow, &bowl.layout.cells, &bowl.units, 0.0);
         bowl.lay(simulation)?;
         Ok(bowl)
     }
@@ -367,7 +373,10 @@ impl Bowl {
             flow,
             columns: Vec::new(),
             sums: Sums::nothing(cells),
-            view: View::default(),
+            view: View {
+                rest: RestStress::nothing(layout.cells.count(), spec.settings.rest_strain),
+                ..View::default()
+            },
             held: Held {
                 accelerations: vec![Vector3::zeros(); count],
                 ..Held::default()
@@ -480,6 +489,11 @@ impl Bowl {
     /// For how long what is laid has acted and is not booked yet (s).
     fn acting(&self, simulation: &Simulation) -> f64 {
         simulation.kick_time(simulation.steps_done() - self.laid_at)
+    }
+
+    /// K_0 of the bed when it was cut.
+    pub fn rest_ratio(&self) -> f64 {
+        self.view.rest.ratio
     }
 
     /// Momentum that the continuum has still to take from the relaxation (N s).

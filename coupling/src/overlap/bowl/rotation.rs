@@ -93,7 +93,7 @@ fn joined(rate: Vector3<f64>, drift: Vector3<f64>, ours: Vector3<f64>) -> Bowl {
     bowl.flow.set_state(state).unwrap();
     bowl.sighting.look(&mut simulation);
     bowl.see_grains();
-    bowl.view.look(&bowl.flow, &cells, &bowl.units);
+    bowl.view.look(&bowl.flow, &cells, &bowl.units, 0.0);
     bowl.agree();
     bowl.lay(&mut simulation).unwrap();
     bowl

@@ -118,7 +118,8 @@ impl Bowl {
         self.flow.set_state(state)?;
         let change = self.flow.volume() - before;
         self.account.copied += change;
-        self.view.look(&self.flow, &self.layout.cells, &self.units);
+        self.view
+            .look(&self.flow, &self.layout.cells, &self.units, 0.0);
         Ok(-change * self.spec.density() * self.units.length.powi(3))
     }
 }

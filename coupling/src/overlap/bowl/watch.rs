@@ -1,6 +1,8 @@
 //! What the monitors look at after every exchange.
 
 use super::Bowl;
+use super::zone::Side;
+use colluvium_dem::Partner;
 
 /// Part of a full cell's mass from which on it is bed.
 const FILLED: f64 = 0.5;
@@ -16,11 +18,41 @@ impl Bowl {
         self.monitors.impulse[1] += traction * self.exchange_time();
     }
 
+    /// Normal force (N) of the contacts that cross the handshake surface, from the nearest side of the grain outside. Averages over
+    /// cells would be too low by what the shell, which bears forces from outside, has of them: a sixth with cells as wide as it.
+    fn through_handshake(&self) -> f64 {
+        let (cells, zone) = (&self.layout.cells, &self.layout.zone);
+        let (belongs, handshake) = (self.spec.belongs(), self.layout.widths[0]);
+        let seen = &self.sighting.snapshot;
+        let mut sum = 0.0;
+        for contact in &seen.contacts {
+            let Partner::Grain(other) = contact.partner else {
+                continue;
+            };
+            let pair = [contact.grain, other].map(|n| &seen.grains[n]);
+            if !pair.into_iter().all(&belongs) {
+                continue;
+            }
+            let inside = pair.map(|g| zone.label(cells, &g.position) > handshake);
+            let (outer, force) = match inside {
+                [true, false] => (pair[1], contact.force),
+                [false, true] => (pair[0], -contact.force),
+                _ => continue,
+            };
+            let depth = |side: &Side| zone.depth(cells, side, &outer.position);
+            let sides = zone.sides.iter();
+            if let Some(side) = sides.min_by(|a, b| depth(a).total_cmp(&depth(b))) {
+                sum -= side.outwards * force[side.axis];
+            }
+        }
+        sum
+    }
+
     /// Looks at both sides of the handshake surface, after a time (s).
     pub(super) fn watch(&mut self, dt: f64) {
         let (cells, zone) = (&self.layout.cells, &self.layout.zone);
         let (mut slips, mut weights) = (0.0, 0.0);
-        let mut force = [0.0; 2];
+        let mut force = [self.through_handshake(), 0.0];
         for face in &self.handshake.all {
             let axis = zone.sides[face.side].axis;
             let Some((fraction, stress, _)) = self.view.between(face.cells) else {
@@ -29,7 +61,6 @@ impl Bowl {
             let area = fraction * cells.face_area(axis);
             force[1] -= area * stress[(axis, axis)];
             for cell in face.cells {
-                force[0] -= 0.5 * area * self.sums.stress[cell][(axis, axis)];
                 let cover = &self.sums.cover[cell];
                 let mass = cover.buffer + cover.inner;
                 if mass > 0.0 {

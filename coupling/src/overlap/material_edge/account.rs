@@ -141,7 +141,7 @@ pub struct Monitors {
     pub slip: f64,
     /// Largest of these (m/s).
     pub largest_slip: f64,
-    /// Σ of the force of the grains' σ_xx through the handshake surface, and of the continuum's (N).
+    /// Σ of the force along x of the contacts that cross the handshake surface, and of the continuum's σ_xx (N).
     pub force: [f64; 2],
     /// Σ of the grains' mass in the full cells of the overlap, over that of the continuum in them.
     pub packing: f64,

@@ -2,6 +2,7 @@
 
 use super::MaterialEdge;
 use super::cells::over;
+use colluvium_dem::Partner;
 
 /// How far beyond the edge a grain has escaped, in diameters.
 const ESCAPED: f64 = 1.0;
@@ -16,12 +17,33 @@ impl MaterialEdge {
         self.monitors.impulse[1] += traction * self.exchange_time();
     }
 
+    /// Force along x (N) of the contacts that cross the handshake surface. Averages over cells would be too low by what the
+    /// shell, which bears forces from outside, has of them.
+    fn through_handshake(&self) -> f64 {
+        let seen = &self.sighting.snapshot;
+        let mut sum = 0.0;
+        for contact in &seen.contacts {
+            let Partner::Grain(other) = contact.partner else {
+                continue;
+            };
+            let pair = [contact.grain, other].map(|n| &seen.grains[n]);
+            if pair.into_iter().all(|g| self.labels.of(g).is_some()) {
+                sum += match pair.map(|g| self.counts(g)) {
+                    [true, false] => contact.force.x,
+                    [false, true] => -contact.force.x,
+                    _ => 0.0,
+                };
+            }
+        }
+        sum
+    }
+
     /// Looks at both sides of the handshake surface.
     pub(super) fn watch(&mut self) {
         let d = self.spec.case.rheology.diameter;
         let columns = self.cells.counts[0];
         let (mut slips, mut weights) = (0.0, 0.0);
-        let mut force = [0.0; 2];
+        let mut pressed = 0.0;
         for (k, &place) in self.held.handshake.iter().enumerate() {
             let Some((fraction, [xx, _, _], _)) = self.view.across(&self.cells, place, k) else {
                 continue;
@@ -29,11 +51,9 @@ impl MaterialEdge {
             let at = self.cells.offset(place);
             let low = at.floor();
             let hats = [(0, 1.0 - (at - low)), (1, at - low)];
-            let mut grains = 0.0;
             for (n, hat) in hats {
                 let i = (low as i64 + n).clamp(0, columns as i64 - 1) as usize;
                 let cell = i + columns * k;
-                grains += hat * self.sums.stress[cell][0];
                 let cover = &self.sums.cover[cell];
                 let mass = cover.buffer + cover.inner;
                 if mass > 0.0 {
@@ -42,10 +62,10 @@ impl MaterialEdge {
                     slips += mass * hat * (slip[0] * slip[0] + slip[1] * slip[1]);
                 }
             }
-            force[0] -= fraction * grains;
-            force[1] -= fraction * xx;
+            pressed -= fraction * xx;
         }
         let area = self.cells.spacing * self.spec.slab;
+        let through = self.through_handshake();
         let slip = over(slips, weights).sqrt();
         let full = self.full();
         let (mut packed, mut cells) = (0.0, 0.0);
@@ -67,9 +87,8 @@ impl MaterialEdge {
         m.exchanges += 1.0;
         m.slip += slip;
         m.largest_slip = m.largest_slip.max(slip);
-        for (sum, force) in m.force.iter_mut().zip(force) {
-            *sum += force * area;
-        }
+        m.force[0] += through;
+        m.force[1] += pressed * area;
         m.packing += over(packed, cells);
         m.escaped = m.escaped.max(escaped);
     }

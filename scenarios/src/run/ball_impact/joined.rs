@@ -10,7 +10,7 @@ use crate::failure::Failure;
 use crate::rheology_file::RheologyFile;
 use crate::run_directory::RunDirectory;
 use crate::scene::world::Materials;
-use crate::scene::{BallImpactScene, DENSE};
+use crate::scene::{BallImpactScene, DENSE, overlap_words};
 use crate::state_hash;
 use crate::summary::{Quantity, Summary};
 use crate::table::Table;
@@ -337,17 +337,9 @@ impl Recipe for JoinedBed<'_> {
         lines.push((
             "overlap".into(),
             format!(
-                "from the box's sides inwards: shell {:.1} d, buffer {:.1} d, inner overlap {:.1} d; loads held {:.2e} s, exchange every \
-                 {:.2e} s, stresses averaged over {:.2e} s, relaxation {:.2e} s, following {:.2e} s, impedance {:.3e} Pa s/m",
-                s.shell / d,
-                s.buffer / d,
-                s.inner / d,
-                s.load_time,
-                s.exchange_time,
-                s.stress_time,
-                s.relaxation_time,
-                s.following_time,
-                s.impedance
+                "from the box's sides inwards: {}, sideways pressure at rest forgotten in a strain of {}",
+                overlap_words(&s, d),
+                s.rest_strain
             ),
         ));
         let law = scene.continuum.calibrated.word().unwrap_or("none");
@@ -539,6 +531,12 @@ impl JoinedBed<'_> {
                 ratio,
                 1.0,
                 "of normal forces through the handshake surface, grains over continuum, means in time; to be within 5 %",
+            ),
+            (
+                "rest_ratio",
+                bowl.rest_ratio(),
+                1.0,
+                "K_0: horizontal over vertical stress of the grains when the box was cut, which the continuum remembers until it is sheared",
             ),
             (
                 "relaxation_share",

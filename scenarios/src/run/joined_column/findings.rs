@@ -6,7 +6,7 @@ use crate::run::column_of_grains::{FLOOR, STILL_LOOKS};
 use crate::run::heap::edge;
 use crate::run::land::Land;
 use crate::run::world::Ran;
-use crate::scene::{ColumnFloorKind, DENSE};
+use crate::scene::{ColumnFloorKind, DENSE, overlap_words};
 use crate::state_hash;
 use crate::summary::{Figure, Quantity, Summary};
 use crate::table::Table;
@@ -58,19 +58,7 @@ impl JoinedColumn<'_> {
         if let Ok(s) = scene.overlap_settings(&self.origin) {
             lines.push((
                 "overlap".into(),
-                format!(
-                    "from the edge into the grains: shell {:.1} d, buffer {:.1} d, inner overlap {:.1} d; loads held {:.2e} s, exchange every \
-                     {:.2e} s, stresses averaged over {:.2e} s, relaxation {:.2e} s, following {:.2e} s, impedance {:.3e} Pa s/m",
-                    s.shell / d,
-                    s.buffer / d,
-                    s.inner / d,
-                    s.load_time,
-                    s.exchange_time,
-                    s.stress_time,
-                    s.relaxation_time,
-                    s.following_time,
-                    s.impedance
-                ),
+                format!("from the edge into the grains: {}", overlap_words(&s, d)),
             ));
         }
         let law = match scene.grains.calibrated.word() {
@@ -309,7 +297,7 @@ impl JoinedColumn<'_> {
                 "force_ratio",
                 ratio,
                 1.0,
-                "of σ_xx through the handshake surface, grains over continuum, means in time; to be within 5 %",
+                "of forces along x through the handshake surface, contacts of grains over σ_xx of the continuum, means in time; to be within 5 %",
             ),
             (
                 "overlap_packing",
