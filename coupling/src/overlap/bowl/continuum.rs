@@ -1,11 +1,12 @@
 //! The continuum's side: a bed in space, and its fields in SI units, cell by cell.
 
 use super::cells::Cells;
+use super::gradients::{gradient, shear_rate};
 use crate::overlap::OverlapError;
 use crate::overlap::rest_stress::RestStress;
 use colluvium_continuum::free_surface::{SpaceFlow, SpaceState, SurfaceOptions};
 use colluvium_continuum::grid::{Axis, Boundary, Grid};
-use colluvium_continuum::rheology::{MuI, Rheology, strain_rate_norm};
+use colluvium_continuum::rheology::{MuI, Rheology};
 use colluvium_continuum::strain::deviator;
 use colluvium_continuum::units::Units;
 use nalgebra::{Matrix3, Vector3};
@@ -101,33 +102,12 @@ impl View {
             );
         }
         for cell in (0..cells.count()).filter(|_| dt > 0.0) {
-            self.rest.strain[cell] += self.shear_rate(cells, cell) * dt;
+            self.rest.strain[cell] += shear_rate(&gradient(self, cells, cell)) * dt;
         }
         for cell in (0..cells.count()).filter(|cell| state.fractions[*cell] > FULL) {
             let stress = &mut self.stress[cell];
             *stress += sideways(self.rest.beyond(cell, stress[(2, 2)]));
         }
-    }
-
-    /// γ̇ of a cell, from the mean velocities of full cells beside it (1/s).
-    fn shear_rate(&self, cells: &Cells, cell: usize) -> f64 {
-        let index = cells.index(cell);
-        let mut gradient = Matrix3::zeros();
-        for axis in 0..3 {
-            let beside = |by: isize| {
-                let mut at = index;
-                at[axis] = at[axis].checked_add_signed(by)?;
-                let inside = at[axis] < cells.counts[axis];
-                inside
-                    .then(|| cells.cell(at))
-                    .filter(|&cell| self.is_full(cell))
-            };
-            let [low, high] = [-1, 1].map(beside);
-            let apart = f64::from(u8::from(low.is_some()) + u8::from(high.is_some()));
-            let [a, b] = [low, high].map(|end| self.velocity[end.unwrap_or(cell)]);
-            gradient.set_column(axis, &((b - a) / (apart.max(1.0) * cells.spacing[axis])));
-        }
-        strain_rate_norm(components(&(gradient + gradient.transpose())).0)
     }
 
     /// Whether a cell has a pressure of its own.

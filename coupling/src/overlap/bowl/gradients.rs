@@ -1,36 +1,40 @@
 //! How fast the continuum is sheared, cell by cell.
 
 use super::cells::Cells;
-use super::continuum::View;
+use super::continuum::{View, components};
+use colluvium_continuum::rheology::strain_rate_norm;
 use nalgebra::{Matrix3, Vector3};
 
-/// L_ij = ∂u_i/∂x_j of all cells (1/s), from differences between the full cells beside each; zero in cells that are not full.
+/// L_ij = ∂u_i/∂x_j of a cell (1/s), from differences between the full cells beside it; zero in one that is not full.
+pub(super) fn gradient(view: &View, cells: &Cells, cell: usize) -> Matrix3<f64> {
+    let mut gradient = Matrix3::zeros();
+    if !view.is_full(cell) {
+        return gradient;
+    }
+    let index = cells.index(cell);
+    for axis in 0..3 {
+        let beside = |n: usize| {
+            let mut other = index;
+            other[axis] = n;
+            let other = cells.cell(other);
+            view.is_full(other).then_some(other)
+        };
+        let low = index[axis].checked_sub(1).and_then(beside);
+        let high = Some(index[axis] + 1).filter(|n| *n < cells.counts[axis]);
+        let high = high.and_then(beside);
+        let count = f64::from(u8::from(low.is_some())) + f64::from(u8::from(high.is_some()));
+        if count > 0.0 {
+            let [a, b] = [low, high].map(|at| view.velocity[at.unwrap_or(cell)]);
+            gradient.set_column(axis, &((b - a) / (count * cells.spacing[axis])));
+        }
+    }
+    gradient
+}
+
+/// Those of all cells.
 pub(super) fn gradients(view: &View, cells: &Cells) -> Vec<Matrix3<f64>> {
-    let gradient = |cell: usize| {
-        let mut gradient = Matrix3::zeros();
-        if !view.is_full(cell) {
-            return gradient;
-        }
-        let index = cells.index(cell);
-        for axis in 0..3 {
-            let beside = |n: usize| {
-                let mut other = index;
-                other[axis] = n;
-                let other = cells.cell(other);
-                view.is_full(other).then_some(other)
-            };
-            let low = index[axis].checked_sub(1).and_then(beside);
-            let high = Some(index[axis] + 1).filter(|n| *n < cells.counts[axis]);
-            let high = high.and_then(beside);
-            let count = f64::from(u8::from(low.is_some())) + f64::from(u8::from(high.is_some()));
-            if count > 0.0 {
-                let [a, b] = [low, high].map(|at| view.velocity[at.unwrap_or(cell)]);
-                gradient.set_column(axis, &((b - a) / (count * cells.spacing[axis])));
-            }
-        }
-        gradient
-    };
-    (0..cells.count()).map(gradient).collect()
+    let of = |cell| gradient(view, cells, cell);
+    (0..cells.count()).map(of).collect()
 }
 
 /// Its interpolation at a place, over full cells.
@@ -47,10 +51,9 @@ pub(super) fn gradient_at(
     if weight > 0.0 { sum / weight } else { sum }
 }
 
-/// γ̇ = √(2 D:D), D the symmetric part.
+/// γ̇ = √(2 D:D), D the symmetric part less its trace.
 pub(super) fn shear_rate(gradient: &Matrix3<f64>) -> f64 {
-    let d = 0.5 * (gradient + gradient.transpose());
-    (2.0 * d.norm_squared()).sqrt()
+    strain_rate_norm(components(&(gradient + gradient.transpose())).0)
 }
 
 /// ω, the rotation rate of the material: half of the curl (1/s).
@@ -78,7 +81,7 @@ mod tests {
         let mut view = View {
             fraction: vec![1.0; cells.count()],
             velocity: (0..cells.count()).map(velocity).collect(),
-            stress: Vec::new(),
+            ..View::default()
         };
         let empty = cells.cell([2, 2, 2]);
         view.fraction[empty] = 0.1;
@@ -92,5 +95,7 @@ mod tests {
         }
         let shear = Matrix3::new(0.0, 0.0, 2.0, 0.0, 0.0, 0.0, 0.0, 0.0, 0.0);
         assert_eq!((shear_rate(&shear), rotation(&shear)), (2.0, Vector3::y()));
+        let pure = Matrix3::from_diagonal(&Vector3::new(1.0, 1.0, -2.0));
+        assert!((shear_rate(&pure) - 12.0_f64.sqrt()).abs() < 1e-14);
     }
 }
