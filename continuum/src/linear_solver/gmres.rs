@@ -44,6 +44,9 @@ impl Goal {
     /// Size of the weighted residual at which the iteration ends: so much of the right-hand side without weights, but
     /// never less of the weighted rows than round-off leaves.
     fn target(&self, b: &[f64]) -> f64 {
+        if self.weight == 1.0 {
+            return self.tolerance * dot(b, b).sqrt();
+        }
         let weighted = &b[self.weighted_from.min(b.len())..];
         let least = LEAST_REDUCTION * self.weight * dot(weighted, weighted).sqrt();
         (self.tolerance * dot(b, b).sqrt()).max(least)

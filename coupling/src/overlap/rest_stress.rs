@@ -14,13 +14,16 @@
 //! what its motion makes it, and a memory would count that twice (σ_xx of grains over continuum 1.15 for 0.94). Under a level bed the term depends on the height alone, is a gradient of nothing along the horizontal and
 //! moves nothing.
 
+use colluvium_continuum::rheology::strain_rate_norm;
+use colluvium_continuum::strain::SPACE_COMPONENTS;
+
 /// What a continuum remembers of its grains' rest.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct RestStress {
     /// K_0; one where nothing is remembered.
     pub ratio: f64,
-    /// Shear strain γ of each cell since.
-    pub strain: Vec<f64>,
+    /// Shear of each cell since, in components whose squares add up to γ² (`continuum::strain`): what is taken back leaves nothing.
+    pub strain: Vec<[f64; SPACE_COMPONENTS]>,
     /// Strain γ_c that wipes it out; without one nothing is remembered.
     pub scale: f64,
 }
@@ -30,7 +33,7 @@ impl RestStress {
     pub fn nothing(cells: usize, scale: f64) -> Self {
         Self {
             ratio: 1.0,
-            strain: vec![0.0; cells],
+            strain: vec![[0.0; SPACE_COMPONENTS]; cells],
             scale,
         }
     }
@@ -48,7 +51,8 @@ impl RestStress {
         if self.scale <= 0.0 {
             return 0.0;
         }
-        (self.ratio - 1.0) * vertical * (-self.strain[cell] / self.scale).exp()
+        let strain = strain_rate_norm(self.strain[cell]);
+        (self.ratio - 1.0) * vertical * (-strain / self.scale).exp()
     }
 }
 
@@ -62,7 +66,7 @@ mod tests {
         assert_eq!(rest.beyond(0, -100.0), 0.0);
         rest.measure(-60.0, -100.0);
         assert!((-100.0 + rest.beyond(0, -100.0) + 60.0).abs() < 1e-12);
-        rest.strain[1] = 0.01;
+        rest.strain[1] = [0.0, 0.006, 0.0, -0.008, 0.0];
         assert!((rest.beyond(1, -100.0) - 40.0 * (-1.0_f64).exp()).abs() < 1e-12);
         // Grains without weight say nothing, and no scale is no memory.
         rest.measure(0.0, 0.0);

@@ -5,7 +5,8 @@
 //! ```
 //! p̄ is the mean over the stretch: near its solid fraction φ_c a flow of hard grains has p ∝ (I(φ))⁻², φ_c − φ ∝ I (da Cruz et
 //! al., *Phys. Rev. E* 72 (2005) 021309), so that ln p is steeper in φ the smaller I is. The box is made larger or smaller between
-//! two stretches with its grains carried. What comes out is [`ShearedCell`], with the means over the last part of the strain.
+//! two stretches with its grains carried: shear stands still for a fiftieth of unit strain after each twentieth, its profile kept. A cell
+//! whose mean pressure is more than twice or less than half of what was asked for is refused. What comes out is [`ShearedCell`], with the means over the last part of the strain.
 
 use super::ingredients::{Amount, Ingredient};
 use super::insertion::{Insertion, TRIES, insert_loose};
@@ -79,6 +80,8 @@ const LOOSE: f64 = 0.5;
 const STRETCH: f64 = 0.05;
 const LOOKS: u64 = 8;
 const CHANGE: f64 = 0.02;
+/// Factor by which the pressure of a cell may miss what was asked for.
+const AWAY: f64 = 2.0;
 /// g and δ.
 const GAIN: f64 = 0.03;
 const MOST: f64 = 0.01;
@@ -155,7 +158,7 @@ impl Shearing {
 /// Shears a cell to a steady state and keeps it.
 ///
 /// # Errors
-/// If a number is out of its range, or the grains fly apart, or `watch` stops it.
+/// If a number is out of its range, the pressure was not reached, the grains fly apart, or `watch` stops it.
 pub fn shear(spec: &Shearing, watch: Watch) -> Result<(ShearedCell, ShearingReport), SetupError> {
     let (mut simulation, report) = steady_shear(spec, watch)?;
     let mut cell = ShearedCell::of(&mut simulation, spec.rate());
@@ -214,6 +217,15 @@ pub fn steady_shear(
     }
     let stress = sum / count;
     let pressure = -stress.trace() / 3.0;
+    // A cell that never jammed, or was shut in, is no packing of the flow asked for.
+    let reached = pressure / spec.pressure;
+    if !(1.0 / AWAY..=AWAY).contains(&reached) {
+        return Err(SetupError::OutOfRange {
+            key: "pressure of the sheared cell over the one asked for".into(),
+            value: reached,
+            allowed: "between a half and two: shear it by more, or faster",
+        });
+    }
     let report = ShearingReport {
         solid_fraction: fractions / blocks,
         pressure,

@@ -145,6 +145,12 @@ impl BallImpactScene {
     }
 }
 
+/// What is looked at of the ball: height (m) and velocity upwards (m/s).
+fn of_ball(ball: Option<&GrainSample>) -> Vec<f64> {
+    let z = |read: fn(&GrainSample) -> f64| ball.map_or(f64::NAN, read);
+    vec![z(|b| b.position.z), z(|b| b.velocity.z)]
+}
+
 /// The ball: it joined last.
 fn ball(seen: &Snapshot) -> Option<&GrainSample> {
     seen.grains.iter().max_by_key(|g| g.id)
@@ -307,8 +313,7 @@ impl Recipe for BallImpactScene {
     }
 
     fn look(&self, _: &mut Simulation, seen: &Snapshot, _: &[f64]) -> Vec<f64> {
-        let z = |read: fn(&GrainSample) -> f64| ball(seen).map_or(f64::NAN, read);
-        vec![z(|b| b.position.z), z(|b| b.velocity.z)]
+        of_ball(ball(seen))
     }
 
     fn conclude(&self, ran: &mut Ran, summary: &mut Summary) -> Result<Vec<Table>, Failure> {

@@ -63,7 +63,8 @@ pub struct BallZoneKeys {
     #[serde(default = "holds")]
     #[schemars(extend("minimum" = 0.0, "maximum" = 1000.0))]
     pub hold_scaled: f64,
-    /// Most grains, the ball included, with zones.moving: a box does not grow where that would make more.
+    /// Most grains, the ball included, with zones.moving: a box does not grow where that would make more. Stored grains are counted;
+    /// packings that come in their place may bring a few per cent more.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 1, "maximum" = 1.0e9))]
     pub budget: Option<u64>,
@@ -265,9 +266,11 @@ impl BallImpactScene {
 
     /// Pressures that they are sheared under (Pa): of half of the bed's depth at rest, and of its inertia beside the ball, a
     /// tenth of ρ v².
-    pub fn sheared_pressures(&self, density: f64, depth: f64) -> [f64; 2] {
+    pub fn sheared_pressures(&self, density: f64, depth: f64) -> Vec<f64> {
         let rest = 0.5 * density * self.gravity * depth;
-        [rest, rest.max(STRUCK * density * self.speed.powi(2))]
+        let struck = STRUCK * density * self.speed.powi(2);
+        let more = (struck > rest).then_some(struck);
+        std::iter::once(rest).chain(more).collect()
     }
 
     /// The overlap's settings with nothing left out.

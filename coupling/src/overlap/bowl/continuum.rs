@@ -1,7 +1,7 @@
 //! The continuum's side: a bed in space, and its fields in SI units, cell by cell.
 
 use super::cells::Cells;
-use super::gradients::{gradient, shear_rate};
+use super::gradients::{gradient, shear_components};
 use crate::overlap::OverlapError;
 use crate::overlap::rest_stress::RestStress;
 use colluvium_continuum::free_surface::{SpaceFlow, SpaceState, SurfaceOptions};
@@ -102,7 +102,10 @@ impl View {
             );
         }
         for cell in (0..cells.count()).filter(|_| dt > 0.0) {
-            self.rest.strain[cell] += shear_rate(&gradient(self, cells, cell)) * dt;
+            let rate = shear_components(&gradient(self, cells, cell));
+            for (sum, rate) in self.rest.strain[cell].iter_mut().zip(rate) {
+                *sum += rate * dt;
+            }
         }
         for cell in (0..cells.count()).filter(|cell| state.fractions[*cell] > FULL) {
             let stress = &mut self.stress[cell];

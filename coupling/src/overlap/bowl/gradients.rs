@@ -51,9 +51,14 @@ pub(super) fn gradient_at(
     if weight > 0.0 { sum / weight } else { sum }
 }
 
-/// γ̇ = √(2 D:D), D the symmetric part less its trace.
+/// Components of D, the symmetric part less its trace, whose squares add up to 2 D:D.
+pub(super) fn shear_components(gradient: &Matrix3<f64>) -> [f64; 5] {
+    components(&(gradient + gradient.transpose())).0
+}
+
+/// γ̇ = √(2 D:D).
 pub(super) fn shear_rate(gradient: &Matrix3<f64>) -> f64 {
-    strain_rate_norm(components(&(gradient + gradient.transpose())).0)
+    strain_rate_norm(shear_components(gradient))
 }
 
 /// ω, the rotation rate of the material: half of the curl (1/s).

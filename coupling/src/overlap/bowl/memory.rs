@@ -62,7 +62,7 @@ impl Bowl {
         put(&self.columns);
         put(&self.moved);
         put(&[self.view.rest.ratio]);
-        put(&self.view.rest.strain);
+        put(self.view.rest.strain.as_flattened());
         let stress = self
             .sums
             .stress
@@ -177,7 +177,7 @@ impl Bowl {
             && columns.len() == layer
             && moved.len() == faces
             && ratio.len() == 1
-            && strain.len() == cells
+            && strain.len() == 5 * cells
             && stress.len() == 6 * cells
             && accelerations.len() == 3 * cells
             && owed.len() == 3 * cells
@@ -195,7 +195,7 @@ impl Bowl {
         bowl.columns = columns.to_vec();
         bowl.moved = moved.to_vec();
         bowl.view.rest.ratio = ratio[0];
-        bowl.view.rest.strain = strain.to_vec();
+        bowl.view.rest.strain = strain.as_chunks::<5>().0.to_vec();
         let stresses = stress.as_chunks::<6>().0.iter();
         bowl.sums.stress = stresses
             .map(|&[xx, yy, zz, xy, xz, yz]| Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))

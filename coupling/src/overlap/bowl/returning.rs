@@ -4,7 +4,8 @@
 //! since they were put by, in the mean over a cell, neighbours have been pulled apart and springs mean nothing: grains of a stored
 //! sheared packing come in their place, if the bowl was given any ([`Bowl::set_packings`]). That one is taken whose ln p and ln I are
 //! nearest to those of the continuum there. It is turned so that the directions of its largest and least rate of stretching are those
-//! of the continuum's mean rate there, or of the shear so far where it rests, and its rotation has the same sense; it is cut to what
+//! of the continuum's mean rate there, or of the shear so far where it rests (whose axes lie a few degrees from those of its rate, and whose sense of rotation is
+//! not known), and its rotation has the same sense; it is cut to what
 //! lies nearer to a grain that it comes for than to any other, and below the continuum's surface; grains at its rim that lie deep in
 //! others are left out. Velocities are the continuum's at
 //! the place of each grain with the fluctuations of the packing, spins half the curl with the packing's. Nothing is scaled; by how

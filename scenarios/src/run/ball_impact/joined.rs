@@ -28,7 +28,7 @@ use std::sync::{Mutex, MutexGuard, PoisonError};
 const MOST_SLIP: f64 = 0.01;
 const MOST_RATIO: f64 = 0.05;
 /// Numbers in front of the bowl's in the memory: solid fraction and surface of the bed.
-const HEAD: usize = 2;
+const HEAD: usize = 3;
 
 /// A bed, and what is alive of it while it runs.
 pub struct JoinedBed<'a> {
@@ -107,7 +107,7 @@ impl<'a> JoinedBed<'a> {
     }
 
     /// What the bed is joined from, at a solid fraction and with its surface at a height (m).
-    fn spec(&self, [solid, surface]: [f64; HEAD], ball: u32) -> Result<BowlSpec, Failure> {
+    fn spec(&self, [solid, surface, ball]: [f64; HEAD]) -> Result<BowlSpec, Failure> {
         let scene = self.scene;
         let (law, valid) = self.law(solid)?;
         let size = [scene.container.length, scene.container.width].map(|e| scene.scale * e);
@@ -122,7 +122,7 @@ impl<'a> JoinedBed<'a> {
             bottom: (surface - scene.zone_depth(law.diameter) - scene.floor()).max(0.0),
             growth: scene.growth(law.diameter, &settings, valid),
             settings,
-            ball: Some(ball),
+            ball: Some(ball as u32),
             law,
         })
     }
@@ -134,7 +134,7 @@ impl<'a> JoinedBed<'a> {
     fn recalled(&self, simulation: &Simulation, memory: &[f64]) -> Result<Bowl, Failure> {
         let damaged = || Failure::Input("--resume: the checkpoint is damaged: recipe/state".into());
         let (head, rest) = memory.split_first_chunk::<HEAD>().ok_or_else(damaged)?;
-        let spec = self.spec(*head, last(simulation))?;
+        let spec = self.spec(*head)?;
         let bowl = Bowl::read(spec, rest, simulation).map_err(|why| self.failure(why))?;
         Ok(self.stocked(bowl))
     }
@@ -153,9 +153,8 @@ impl<'a> JoinedBed<'a> {
         // The ball joined last.
         bed.pop();
         let solid = solid_fraction(&bed, simulation.domain(), &self.scene.middle(&bed));
-        let head = [solid, self.scene.surface(&bed)];
-        let bowl =
-            Bowl::cut(self.spec(head, ball)?, simulation).map_err(|why| self.failure(why))?;
+        let head = [solid, self.scene.surface(&bed), f64::from(ball)];
+        let bowl = Bowl::cut(self.spec(head)?, simulation).map_err(|why| self.failure(why))?;
         Ok((head, self.stocked(bowl)))
     }
 
@@ -175,9 +174,8 @@ impl<'a> JoinedBed<'a> {
         };
         let back = match scene.returns_sheared() {
             true => format!(
-                "there grains of packings come in their place: {} of {} grains each, sheared before the run at I of {:?} under two \
+                "there grains of packings come in their place: of {} grains each, sheared before the run at I of {:?} under one or two \
                  pressures (zones.returning, zones.sheared_inertial, zones.sheared_grains)",
-                2 * scene.sheared_inertial().len(),
                 scene.sheared_grains(),
                 scene.sheared_inertial(),
             ),
@@ -186,7 +184,13 @@ impl<'a> JoinedBed<'a> {
         format!(
             "a side goes outwards, too, where the continuum beside it is sheared faster than I = {}, or what is stored there has been \
              sheared by more than {}; {back}",
-            limit(growth.fastest, "zones.fastest_inertial"),
+            match (scene.zones.fastest_inertial, growth.fastest.is_finite()) {
+                (None, true) => format!(
+                    "{:.3} (computed: the calibrated law's range ends there; zones.fastest_inertial left out)",
+                    growth.fastest
+                ),
+                _ => limit(growth.fastest, "zones.fastest_inertial"),
+            },
             limit(growth.misplaced, "zones.misplaced_shear"),
         )
     }
@@ -218,7 +222,7 @@ impl<'a> JoinedBed<'a> {
     }
 }
 
-/// Number of the ball: it joined last.
+/// Number of the ball before grains of packings come in: it joined last.
 fn last(simulation: &Simulation) -> u32 {
     simulation.held(|_| true).map(|g| g.id).max().unwrap_or(0)
 }
@@ -313,7 +317,9 @@ impl Recipe for JoinedBed<'_> {
         if let Some(growth) = scene.growth(d, &s, valid) {
             let travel = &growth.travel;
             let most = match scene.zones.budget {
-                Some(most) => format!("never to more than {most} grains (zones.budget)"),
+                Some(most) => format!(
+                    "to no more than {most} stored grains and the ball (zones.budget; packings may bring a few per cent more)"
+                ),
                 None => "as far as the container reaches (zones.budget left out)".into(),
             };
             lines.push((
@@ -374,7 +380,7 @@ impl Recipe for JoinedBed<'_> {
         };
         bowl.go_on(simulation).map_err(|why| self.failure(why))?;
         if bowl.at_exchange() {
-            let head = [state[0], state[1]];
+            let head = [state[0], state[1], state[2]];
             Self::remember(&head, bowl, state);
             // What the ball does to the continuum, and the continuum to it, nobody computes.
             if bowl.ball_clearance(simulation).is_some_and(|c| c <= 0.0) {
@@ -391,7 +397,11 @@ impl Recipe for JoinedBed<'_> {
     }
 
     fn look(&self, simulation: &mut Simulation, seen: &Snapshot, state: &[f64]) -> Vec<f64> {
-        self.scene.look(simulation, seen, state)
+        match state.get(HEAD - 1) {
+            // Grains of packings have joined after the ball.
+            Some(number) => of_ball(seen.grains.iter().find(|g| f64::from(g.id) == *number)),
+            None => self.scene.look(simulation, seen, state),
+        }
     }
 
     fn has_continuum(&self) -> bool {

@@ -8,7 +8,6 @@ use crate::run_directory::{RunDirectory, SHEARED};
 use crate::scene::BallImpactScene;
 use crate::scene::world::Materials;
 use crate::seal;
-use colluvium_dem::SetupError;
 use colluvium_dem::preparation::{RestMeasures, ShearedCell, Shearing, shear};
 use std::ops::ControlFlow;
 use std::path::Path;
@@ -80,10 +79,8 @@ fn make(all: &[Shearing], journal: &Journal) -> Result<Vec<ShearedCell>, Failure
     let mut cells = Vec::new();
     for spec in all {
         let made = shear(spec, &mut watch);
-        let (cell, report) = made.map_err(|error| match error {
-            SetupError::OutOfRange { .. } => Failure::Input(format!("zones: {error}")),
-            error => Failure::Run(format!("sheared packings: {error}")),
-        })?;
+        let (cell, report) =
+            made.map_err(|error| Failure::Run(format!("sheared packings: {error}")))?;
         journal.note(&format!("packing of {} grains {report}", spec.grains));
         cells.push(cell);
     }
