@@ -193,11 +193,13 @@ pub fn run(recipe: &dyn Recipe, under: &mut Under) -> Result<Findings, Failure> 
     if again {
         under.begin()?;
     }
-    let stocked = recipe.stock(&materials, stand.setup.timestep, under.directory);
-    if crate::interruption::requested() {
-        return Err(under.interrupted());
+    // Once there is a stock an interruption waits for the first checkpoint.
+    if let Err(why) = recipe.stock(&materials, stand.setup.timestep, under.directory) {
+        return Err(match crate::interruption::requested() {
+            true => under.interrupted(),
+            false => why,
+        });
     }
-    stocked?;
     let clock = Instant::now();
     let bodies = stand.world.bodies.clone();
     let pictures = Pictures::new(recipe, &materials, &bodies, under.directory);
