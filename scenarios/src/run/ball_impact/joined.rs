@@ -5,6 +5,7 @@
 
 use super::super::surface_fields::space_frame;
 use super::super::world::{Course, Expected, Ran, Recipe, as_the_scene};
+use super::of_ball;
 use super::{moves, sheared_packings};
 use crate::failure::Failure;
 use crate::rheology_file::RheologyFile;
@@ -244,7 +245,7 @@ impl Recipe for JoinedBed<'_> {
     fn check(&self) -> Result<(), Failure> {
         let materials = self.scene.materials(&self.origin)?;
         let height = self.expected_height(self.scene.grain_diameter(&materials));
-        let spec = self.spec([DENSE, self.scene.floor() + height], 0)?;
+        let spec = self.spec([DENSE, self.scene.floor() + height, 0.0])?;
         spec.check(height).map_err(|why| self.failure(why))
     }
 
