@@ -5,6 +5,7 @@
 //! that of their grains, and velocities and spins are those that the integrator holds, half a step back.
 
 use colluvium_dem::{ContactSample, GrainSample, Partner, Simulation, Snapshot};
+use nalgebra::Vector3;
 
 /// Free grains as they are held, in the order of their numbers.
 pub(super) fn free_grains(simulation: &Simulation) -> Vec<GrainSample> {
@@ -29,6 +30,26 @@ pub(super) struct Sighting {
 }
 
 impl Sighting {
+    /// Contacts that cross a surface: the grain outside it, and the force (N) on the one inside. Grains of which `inside`
+    /// knows nothing lie on neither side.
+    pub fn crossing(
+        &self,
+        inside: impl Fn(&GrainSample) -> Option<bool>,
+    ) -> impl Iterator<Item = (&GrainSample, Vector3<f64>)> {
+        let grains = &self.snapshot.grains;
+        self.snapshot.contacts.iter().filter_map(move |contact| {
+            let Partner::Grain(other) = contact.partner else {
+                return None;
+            };
+            let pair = [contact.grain, other].map(|n| &grains[n]);
+            match pair.map(&inside) {
+                [Some(true), Some(false)] => Some((pair[1], contact.force)),
+                [Some(false), Some(true)] => Some((pair[0], -contact.force)),
+                _ => None,
+            }
+        })
+    }
+
     /// Looks at the grains as they are now.
     pub fn look(&mut self, simulation: &mut Simulation) {
         let snapshot = &mut self.snapshot;

@@ -2,7 +2,7 @@
 
 use super::Bowl;
 use super::zone::Side;
-use colluvium_dem::Partner;
+use colluvium_dem::GrainSample;
 
 /// Part of a full cell's mass from which on it is bed.
 const FILLED: f64 = 0.5;
@@ -23,22 +23,10 @@ impl Bowl {
     fn through_handshake(&self) -> f64 {
         let (cells, zone) = (&self.layout.cells, &self.layout.zone);
         let (belongs, handshake) = (self.spec.belongs(), self.layout.widths[0]);
-        let seen = &self.sighting.snapshot;
+        let inside =
+            |g: &GrainSample| belongs(g).then(|| zone.label(cells, &g.position) > handshake);
         let mut sum = 0.0;
-        for contact in &seen.contacts {
-            let Partner::Grain(other) = contact.partner else {
-                continue;
-            };
-            let pair = [contact.grain, other].map(|n| &seen.grains[n]);
-            if !pair.into_iter().all(&belongs) {
-                continue;
-            }
-            let inside = pair.map(|g| zone.label(cells, &g.position) > handshake);
-            let (outer, force) = match inside {
-                [true, false] => (pair[1], contact.force),
-                [false, true] => (pair[0], -contact.force),
-                _ => continue,
-            };
+        for (outer, force) in self.sighting.crossing(inside) {
             let depth = |side: &Side| zone.depth(cells, side, &outer.position);
             let sides = zone.sides.iter();
             if let Some(side) = sides.min_by(|a, b| depth(a).total_cmp(&depth(b))) {

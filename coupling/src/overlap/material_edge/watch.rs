@@ -2,7 +2,7 @@
 
 use super::MaterialEdge;
 use super::cells::over;
-use colluvium_dem::Partner;
+use colluvium_dem::GrainSample;
 
 /// How far beyond the edge a grain has escaped, in diameters.
 const ESCAPED: f64 = 1.0;
@@ -20,22 +20,9 @@ impl MaterialEdge {
     /// Force along x (N) of the contacts that cross the handshake surface. Averages over cells would be too low by what the
     /// shell, which bears forces from outside, has of them.
     fn through_handshake(&self) -> f64 {
-        let seen = &self.sighting.snapshot;
-        let mut sum = 0.0;
-        for contact in &seen.contacts {
-            let Partner::Grain(other) = contact.partner else {
-                continue;
-            };
-            let pair = [contact.grain, other].map(|n| &seen.grains[n]);
-            if pair.into_iter().all(|g| self.labels.of(g).is_some()) {
-                sum += match pair.map(|g| self.counts(g)) {
-                    [true, false] => contact.force.x,
-                    [false, true] => -contact.force.x,
-                    _ => 0.0,
-                };
-            }
-        }
-        sum
+        let inside = |g: &GrainSample| self.labels.of(g).map(|_| self.counts(g));
+        let crossing = self.sighting.crossing(inside);
+        crossing.map(|(_, force)| force.x).sum()
     }
 
     /// Looks at both sides of the handshake surface.
