@@ -58,7 +58,9 @@ impl JoinedBed<'_> {
                 let scale = self.scene.scale;
                 let floor = self.scene.container.floor;
                 let (key, value) = match key {
-                    "half_width" => ("zones.half_width", value / scale),
+                    "x" if self.scene.zones.x.is_some() => ("zones.x[1]", value / scale),
+                    "y" if self.scene.zones.y.is_some() => ("zones.y[1]", value / scale),
+                    "x" | "y" => ("zones.half_width", value / scale),
                     "bottom" => ("zones.depth, whose bottom lies at z", floor + value / scale),
                     _ => (key, value),
                 };
@@ -112,14 +114,13 @@ impl<'a> JoinedBed<'a> {
         let scene = self.scene;
         let (law, valid) = self.law(solid)?;
         let size = [scene.container.length, scene.container.width].map(|e| scene.scale * e);
-        let half = scene.half_width(law.diameter);
         let settings = scene.overlap_settings(&self.origin)?;
         Ok(BowlSpec {
             low: [-0.5 * size[0], -0.5 * size[1], scene.floor()],
             size,
             gravity: scene.gravity,
             options: SurfaceOptions::default(),
-            half: [half; 2],
+            edges: scene.zone_edges(law.diameter),
             bottom: (surface - scene.zone_depth(law.diameter) - scene.floor()).max(0.0),
             growth: scene.growth(law.diameter, &settings, valid),
             settings,
@@ -196,6 +197,29 @@ impl<'a> JoinedBed<'a> {
         )
     }
 
+    /// Where the box ends along x and y.
+    fn edges_in_words(&self, d: f64) -> String {
+        let scene = self.scene;
+        let axes = [("x", scene.zones.x), ("y", scene.zones.y)].into_iter();
+        let edges = scene.zone_edges(d).into_iter().zip(scene.container_edges());
+        let words: Vec<String> = axes
+            .zip(edges)
+            .map(|((name, given), (edges, wall))| {
+                let why = match (given, scene.zones.half_width) {
+                    (Some(_), _) => format!("zones.{name} given"),
+                    (None, Some(_)) => "zones.half_width given".into(),
+                    (None, None) => "zones.half_width computed".into(),
+                };
+                let [low, high] = edges.map(|edge| match edge.abs() >= wall {
+                    true => "the wall".into(),
+                    false => format!("{edge:.4} m ({:.1} d)", edge / d),
+                });
+                format!("{name} from {low} to {high} ({why})")
+            })
+            .collect();
+        words.join(", ")
+    }
+
     /// Height of the bed (m), before it is there to be measured.
     fn expected_height(&self, diameter: f64) -> f64 {
         let scene = self.scene;
@@ -211,9 +235,10 @@ impl<'a> JoinedBed<'a> {
             return [1.0; 2];
         };
         let d = scene.grain_diameter(&materials);
-        let half = scene.half_width(d);
-        let edges = [scene.container.length, scene.container.width].map(|e| 0.5 * scene.scale * e);
-        let across: f64 = edges.iter().map(|edge| (half / edge).min(1.0)).product();
+        let edges = scene.zone_edges(d).into_iter().zip(scene.container_edges());
+        let across: f64 = edges
+            .map(|([low, high], wall)| (high.min(wall) - low.max(-wall)) / (2.0 * wall))
+            .product();
         let start = scene.zone_depth(d);
         let last = match scene.zones.moving {
             true => start.max(scene.lasting_depth(d)),
@@ -303,11 +328,9 @@ impl Recipe for JoinedBed<'_> {
         lines.push((
             "zones".into(),
             format!(
-                "grains within {:.4} m ({:.1} d; zones.half_width {}) of the axis along x and y and {:.4} m ({:.1} d; zones.depth {}) \
-                 below the surface, continuum beyond; {:.0} % of the grain-steps of a bed of grains",
-                scene.half_width(d),
-                scene.half_width(d) / d,
-                why(scene.zones.half_width),
+                "grains in a box: {} (from the axis), {:.4} m ({:.1} d; zones.depth {}) deep below the surface, continuum beyond; {:.0} % of \
+                 the grain-steps of a bed of grains",
+                self.edges_in_words(d),
                 scene.zone_depth(d),
                 scene.zone_depth(d) / d,
                 why(scene.zones.depth),
@@ -437,7 +460,7 @@ impl Recipe for JoinedBed<'_> {
                 ran.simulation.time(),
                 match self.scene.zones.moving {
                     true => "The box could not grow as fast as needed: see the moves that were refused, and zones.near_diameters.",
-                    false => "zones.depth or zones.half_width is too small for it; zones.moving = true lets the box grow.",
+                    false => "zones.depth or zones.half_width (or zones.x, zones.y) is too small for it; zones.moving = true lets the box grow.",
                 }
             ));
         }
