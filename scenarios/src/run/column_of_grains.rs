@@ -6,10 +6,10 @@
 use super::heap::{HeapAxis, HeapCourse, edge};
 use super::land::Land;
 use super::world::workshop::{Surroundings, softened, step_for};
-use super::world::{Course, Expected, Ran, Recipe, Workshop, World, fragments};
+use super::world::{Course, Expected, Ran, Recipe, RecipeKeys, Workshop, World, fragments};
 use crate::failure::Failure;
-use crate::scene::world::{Materials, OutputKeys, Place, StepKeys};
-use crate::scene::{CollapseScene, ColumnFloorKind, DENSE, LawKeys, layers};
+use crate::scene::world::{Materials, Place};
+use crate::scene::{CollapseScene, ColumnFloorKind, DENSE, layers};
 use crate::summary::{Quantity, Summary};
 use crate::table::Table;
 use colluvium_dem::preparation::{Amount, Packing, Relaxation, Rest, solid_fraction};
@@ -221,28 +221,15 @@ impl Recipe for CollapseScene {
         Ok(self.grain_materials(origin)?)
     }
 
-    fn contact(&self) -> &LawKeys {
-        &self.contact
-    }
-
-    fn seed(&self) -> u64 {
-        self.grains.seed
-    }
-
-    fn coarse_graining(&self) -> f64 {
-        1.0
-    }
-
-    fn step(&self) -> &StepKeys {
-        &self.timestep
-    }
-
-    fn output(&self) -> &OutputKeys {
-        &self.output
-    }
-
-    fn packing(&self) -> Option<&str> {
-        self.grains.packing.as_deref()
+    fn keys(&self) -> RecipeKeys<'_> {
+        RecipeKeys {
+            contact: &self.contact,
+            seed: self.grains.seed,
+            coarse_graining: 1.0,
+            step: &self.timestep,
+            output: &self.output,
+            packing: self.grains.packing.as_deref(),
+        }
     }
 
     fn provenance(&self) -> Option<toml::Table> {
