@@ -13,7 +13,9 @@ pub use ground::{CollapseGround, Matter};
 use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, require};
-use crate::free_surface::{CellFields, SurfaceFlow, SurfaceOptions, SurfaceState, SurfaceStep};
+use crate::free_surface::{
+    CellFields, History, SurfaceFlow, SurfaceOptions, SurfaceState, SurfaceStep,
+};
 use crate::grid::{Axis, Boundary, Grid};
 use crate::rheology::{MuI, ShearLaw};
 use crate::units::Units;
@@ -284,6 +286,7 @@ impl<L: ShearLaw + Clone> Collapse<L> {
             velocity: matter
                 .velocity
                 .map(|u| u.into_iter().map(|u| u / unit).collect()),
+            history: History::default(),
             ..self.flow.state().clone()
         })?;
         self.start_volume = self.flow.volume();

@@ -26,7 +26,7 @@ mod transport;
 pub use faces::ThinLayer;
 pub use fields::CellFields;
 pub use flow::{
-    SpaceFields, SpaceFlow, SpaceState, Spent, SurfaceFlow, SurfaceOptions, SurfaceState,
+    History, SpaceFields, SpaceFlow, SpaceState, Spent, SurfaceFlow, SurfaceOptions, SurfaceState,
     SurfaceStep,
 };
 pub use ground::{Contact, Terrain};

@@ -128,7 +128,7 @@ pub trait YieldSolver<
 }
 
 /// Smallest threshold pressure: below it only cohesion is left. In natural units.
-const PRESSURE_FLOOR: f64 = 1e-10;
+pub(crate) const PRESSURE_FLOOR: f64 = 1e-10;
 
 /// Threshold pressure at a point, and whether it still depends on the cells' pressure.
 #[inline]

@@ -3,12 +3,14 @@
 //! Positions and velocities leap over each other: material moves by a full Δt with the velocity of
 //! the middle of that step, then the velocity moves on by the mean of two steps under the forces of
 //! the new positions. Both are implicit where they have to be (yield, pressure) and the pair is of
-//! second order in Δt for forces that depend on position.
+//! second order in Δt for forces that depend on position; [`History`] makes it so for stress and advection.
 
 mod accelerate;
+mod history;
 mod setup;
 mod state;
 
+pub use history::History;
 pub use state::{SpaceFields, SpaceState, Spent, SurfaceOptions, SurfaceState, SurfaceStep};
 
 use super::faces::ACTIVE;
@@ -18,7 +20,7 @@ use super::outside::Outside;
 use super::plane::Plane;
 use super::sliding::SlidingPlaces;
 use super::topology::{NONE, Topology};
-use super::transport::{MASSLESS, Motion, Transport};
+use super::transport::{MASSLESS, Motion, Transport, Velocity};
 use crate::discretisation::{COMPONENTS, VELOCITIES};
 use crate::error::Error;
 use crate::grid::{Axis, DIMENSIONS, Grid};
@@ -56,6 +58,10 @@ pub struct SurfaceFlow<
     saved: SurfaceState<D, C>,
     planes: Vec<Option<Plane>>,
     transport: Transport<D>,
+    /// The velocity that carries material in a step.
+    carrier: Velocity<D>,
+    /// Leads of one component that faces have of themselves.
+    own_leads: Vec<f64>,
     side_walls: Option<SideWalls>,
     sliding: SlidingPlaces<D>,
     bed: Option<Ground<D>>,
@@ -117,7 +123,10 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         let fits = state.fractions.len() == cells
             && state.pressure.len() == cells
             && state.stress.len() == self.state.stress.len()
-            && (0..D).all(|c| state.velocity[c].len() == self.topology.faces(c));
+            && (0..D).all(|c| state.velocity[c].len() == self.topology.faces(c))
+            && state
+                .history
+                .fits(|c| self.topology.faces(c), state.stress.len());
         if !fits {
             return Err(Error::ForeignState {
                 found: state.fractions.len(),
@@ -152,9 +161,13 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
     /// Momentum of the material.
     pub fn momentum(&self) -> [f64; D] {
         std::array::from_fn(|c| {
+            let lead = &self.state.history.lead[c];
             let faces = self.state.velocity[c].iter().enumerate();
             faces
-                .map(|(face, u)| self.topology.face_mean(c, face, &self.state.fractions) * u)
+                .map(|(face, u)| {
+                    let carried = u - lead.get(face).unwrap_or(&0.0);
+                    self.topology.face_mean(c, face, &self.state.fractions) * carried
+                })
                 .sum::<f64>()
                 * self.grid.cell_volume()
         })
@@ -271,6 +284,16 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             // The velocity moves on to the middle of the next step, from wherever it is: the last one
             // may have become shorter than it was planned.
             let next = self.allowed_step(growing_from);
+            if self.options.second_order {
+                self.state.history.give_lead(
+                    &self.topology,
+                    &self.state.fractions,
+                    self.transport.carried(),
+                    &mut self.state.velocity,
+                    0.5 * next / dt,
+                    &mut self.own_leads,
+                );
+            }
             let until = self.state.time + dt + 0.5 * next;
             let ahead = (until - self.state.velocity_time).max(LEAST_PUSH * dt);
             if self.accelerate(ahead, &mut record)? {
@@ -344,10 +367,17 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                 }
             })
             .collect();
+        self.carrier.clone_from(&self.state.velocity);
         let passes = (dt * self.largest_rate() / LONGEST_PASS).ceil().max(1.0);
+        if self.options.second_order {
+            let (state, topology) = (&mut self.state, &self.topology);
+            let history = &mut state.history;
+            history.take_lead(topology, &state.fractions, &mut state.velocity);
+        }
         self.transport.advance(
             &Motion {
                 topology: &self.topology,
+                carrier: &self.carrier,
                 passes: passes as usize,
                 courant: std::array::from_fn(|axis| dt / (passes * axes[axis].spacing())),
                 orders: &orders,

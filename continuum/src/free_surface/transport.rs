@@ -40,6 +40,7 @@ pub(crate) struct Transport<const D: usize = DIMENSIONS> {
     next: Vec<f64>,
     /// Matter and ground together.
     filled: Vec<f64>,
+    /// Velocities that are carried, before the step.
     start: Velocity<D>,
     /// Momentum of each velocity of a component.
     momentum: Vec<f64>,
@@ -54,7 +55,9 @@ pub(crate) struct Transport<const D: usize = DIMENSIONS> {
 /// What moves, and how fast.
 pub(crate) struct Motion<'a, const D: usize = DIMENSIONS> {
     pub topology: &'a Topology<D>,
-    /// Parts of the step, each of which moves material with the same velocity.
+    /// What carries.
+    pub carrier: &'a Velocity<D>,
+    /// Parts of the step, each of which is carried by the same velocity.
     pub passes: usize,
     /// Δt of a part over the cell size along each axis.
     pub courant: [f64; D],
@@ -99,7 +102,7 @@ impl<const D: usize> Default for Transport<D> {
 }
 
 impl<const D: usize> Transport<D> {
-    /// Moves material and momentum; walls let nothing through.
+    /// Moves material and the momentum of a velocity; walls let nothing through.
     pub(crate) fn advance(
         &mut self,
         motion: &Motion<'_, D>,
@@ -199,6 +202,11 @@ impl<const D: usize> Transport<D> {
         }
     }
 
+    /// Velocities that were carried, before the last step.
+    pub(crate) fn carried(&self) -> &Velocity<D> {
+        &self.start
+    }
+
     /// Volumes that flowed in and out in the last step, in cell volumes.
     pub(crate) fn passed(&self) -> [f64; 2] {
         self.passed
@@ -206,7 +214,7 @@ impl<const D: usize> Transport<D> {
 
     /// Volume through open ends.
     fn pass_ends(&mut self, motion: &Motion<'_, D>, inflow: &Inflow, fractions: &[f64]) {
-        let start = &self.start[0];
+        let start = &motion.carrier[0];
         let width = start.len() / inflow.speeds.len();
         for (row, filled) in inflow.fractions.iter().enumerate() {
             let (first, last) = (row * width, row * width + width - 1);
@@ -229,7 +237,7 @@ impl<const D: usize> Transport<D> {
         fractions: &[f64],
         axis: usize,
     ) {
-        let (planes, start) = (&self.planes, &self.start[axis]);
+        let (planes, start) = (&self.planes, &motion.carrier[axis]);
         let topology = motion.topology;
         let flux = |face: usize| {
             let ([low, high], u) = (topology.face_cells[axis][face], start[face]);
@@ -255,7 +263,7 @@ impl<const D: usize> Transport<D> {
     }
 
     fn volume_fluxes(&mut self, motion: &Motion<'_, D>, fractions: &[f64], axis: usize) {
-        let (planes, start) = (&self.planes, &self.start[axis]);
+        let (planes, start) = (&self.planes, &motion.carrier[axis]);
         self.fluxes.clear();
         self.fluxes
             .extend(
@@ -300,10 +308,11 @@ impl<const D: usize> Transport<D> {
             } else if is_last {
                 -self.total_dilatation[cell]
             } else if let Some(ground) = motion.ground {
-                let through = |face: usize| self.start[axis][face] * ground.aperture[axis][face];
+                let through =
+                    |face: usize| motion.carrier[axis][face] * ground.aperture[axis][face];
                 (through(high) - through(low)) * motion.courant[axis]
             } else {
-                (self.start[axis][high] - self.start[axis][low]) * motion.courant[axis]
+                (motion.carrier[axis][high] - motion.carrier[axis][low]) * motion.courant[axis]
             };
             self.total_dilatation[cell] += dilatation;
             self.dilatation.push(dilatation);

@@ -4,7 +4,7 @@ use super::Under;
 use crate::failure::Failure;
 use crate::frames;
 use crate::summary::{Quantity, Summary};
-use colluvium_continuum::free_surface::{SurfaceState, SurfaceStep};
+use colluvium_continuum::free_surface::{History, SurfaceState, SurfaceStep};
 use colluvium_dem::Record;
 
 /// Instants of the front over the duration.
@@ -139,14 +139,14 @@ pub(super) fn join_pictures(
     frames::join(under.directory.path(), frames::FIELDS, &instants)
 }
 
-/// Names of the velocity's components.
-fn components<const D: usize>() -> impl Iterator<Item = &'static str> {
+/// Names of a vector's components.
+fn components<const D: usize>(vector: &str) -> impl Iterator<Item = String> {
     let all: &[&str] = if D == 2 {
-        &["velocity/x", "velocity/z"]
+        &["x", "z"]
     } else {
-        &["velocity/x", "velocity/y", "velocity/z"]
+        &["x", "y", "z"]
     };
-    all.iter().copied()
+    all.iter().map(move |axis| format!("{vector}/{axis}"))
 }
 
 /// Puts a state into a checkpoint.
@@ -158,14 +158,25 @@ pub(super) fn put_state<const D: usize, const C: usize>(
         record.numbers.insert(name.to_owned(), values);
     };
     put("fractions", state.fractions.clone());
-    for (name, velocity) in components::<D>().zip(&state.velocity) {
-        put(name, velocity.clone());
+    let history = &state.history;
+    for (vector, values) in [("velocity", &state.velocity), ("lead", &history.lead)] {
+        for (name, values) in components::<D>(vector).zip(values) {
+            put(&name, values.clone());
+        }
     }
     put("pressure", state.pressure.clone());
     put("stress", state.stress.iter().flatten().copied().collect());
+    put("threshold_pressure", history.pressure.clone());
+    let changes = history.friction_change.iter().flatten();
+    put("friction_change", changes.copied().collect());
     put(
         "time",
-        vec![state.time, state.velocity_time, state.next_step],
+        vec![
+            state.time,
+            state.velocity_time,
+            state.next_step,
+            history.push,
+        ],
     );
     put("passed", state.passed.to_vec());
     let steps = vec![state.steps as u64];
@@ -178,12 +189,22 @@ pub(super) fn state_of<const D: usize, const C: usize>(
 ) -> Option<SurfaceState<D, C>> {
     let numbers = |name: &str| record.numbers.get(name).cloned();
     let time = numbers("time")?;
-    let velocity: Vec<Vec<f64>> = components::<D>().map(numbers).collect::<Option<_>>()?;
+    let vector = |name: &str| -> Option<[Vec<f64>; D]> {
+        let rows = components::<D>(name).map(|name| numbers(&name));
+        rows.collect::<Option<Vec<_>>>()?.try_into().ok()
+    };
+    let stresses = |name: &str| Some(numbers(name)?.as_chunks::<C>().0.to_vec());
     Some(SurfaceState {
         fractions: numbers("fractions")?,
-        velocity: velocity.try_into().ok()?,
+        velocity: vector("velocity")?,
         pressure: numbers("pressure")?,
-        stress: numbers("stress")?.as_chunks::<C>().0.to_vec(),
+        stress: stresses("stress")?,
+        history: History {
+            lead: vector("lead")?,
+            pressure: numbers("threshold_pressure")?,
+            friction_change: stresses("friction_change")?,
+            push: *time.get(3)?,
+        },
         time: *time.first()?,
         velocity_time: *time.get(1)?,
         next_step: *time.get(2)?,

@@ -72,6 +72,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             self.spent.operators += clock.elapsed().as_secs_f64();
             record.active_cells = faces.active.len();
             record.residuals = Residuals::default();
+            self.state.history.forget_stress();
             self.scatter(&faces, &places, dt);
             return Ok(true);
         }
@@ -93,7 +94,11 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         self.spent.analysis += clock.elapsed().as_secs_f64();
         let clock = std::time::Instant::now();
         record.active_cells = faces.active.len();
-        let load = discretisation.load(self.acceleration);
+        let mut load = discretisation.load(self.acceleration);
+        if self.options.second_order {
+            let history = &self.state.history;
+            history.add_load(&discretisation, &places, dt, &mut load);
+        }
         let problem = StepProblem {
             discretisation: &discretisation,
             rheology: &self.rheology,
@@ -114,6 +119,10 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                 for (sum, rate) in self.untaken.iter_mut().zip(rates) {
                     *sum += rate * dt;
                 }
+            }
+            if self.options.second_order {
+                let (history, stress) = (&mut self.state.history, &self.state.stress);
+                history.note(&discretisation, &places, &self.unknowns, stress, dt);
             }
             self.scatter(&faces, &places, dt);
         }
@@ -202,6 +211,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                 }
             }
         }
+        self.state.history.drop_lead(&faces);
         faces.spread(&self.unknowns.u, &mut self.state.velocity);
         if let Some(inflow) = &self.inflow {
             inflow.impose(&self.topology, &mut self.state.velocity);

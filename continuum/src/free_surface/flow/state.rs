@@ -2,6 +2,7 @@
 
 use serde::{Deserialize, Serialize};
 
+use super::history::History;
 use crate::discretisation::COMPONENTS;
 use crate::error::{Error, require};
 use crate::free_surface::faces::ThinLayer;
@@ -21,6 +22,9 @@ pub struct SurfaceOptions {
     pub largest_step: f64,
     /// Factor by which a time step may exceed the one before.
     pub growth: f64,
+    /// Whether stress and advection are those of the middle of a step, for an error of second order in the time step.
+    /// Of flows whose state is changed from outside step by step nothing is known of the step before, so they do without.
+    pub second_order: bool,
     /// How layers thinner than half a cell move over rough walls.
     pub thin_layer: ThinLayer,
     /// The solver of the implicit part.
@@ -33,6 +37,7 @@ impl Default for SurfaceOptions {
             courant: 0.45,
             largest_step: 0.05,
             growth: 1.3,
+            second_order: true,
             thin_layer: ThinLayer::default(),
             solver: PrimalDualOptions {
                 strain_rate_floor: 1e-5,
@@ -100,13 +105,15 @@ pub struct SurfaceStep {
 pub struct SurfaceState<const D: usize = DIMENSIONS, const C: usize = COMPONENTS> {
     /// Fraction of each cell that is filled.
     pub fractions: Vec<f64>,
-    /// Velocity on each face of each component.
+    /// Velocity on each face of each component, at the time of the velocity.
     pub velocity: [Vec<f64>; D],
     /// Pressure of each cell, negative where there is none.
     pub pressure: Vec<f64>,
     /// Stress at each corner of each cell, then the traction of side walls there if there are any, then
     /// that of ground in each cell under Coulomb friction.
     pub stress: Vec<[f64; C]>,
+    /// What the next step takes from the last one.
+    pub history: History<D, C>,
     /// Time of the fractions.
     pub time: f64,
     /// Time of the velocity, half a step ahead.
@@ -126,6 +133,7 @@ impl<const D: usize, const C: usize> Default for SurfaceState<D, C> {
             velocity: std::array::from_fn(|_| Vec::new()),
             pressure: Vec::new(),
             stress: Vec::new(),
+            history: History::default(),
             time: 0.0,
             velocity_time: 0.0,
             next_step: 0.0,

@@ -75,7 +75,9 @@ fn step(
     if !nth.is_multiple_of(2) {
         orders.iter_mut().for_each(|order| order.reverse());
     }
+    let carrier = velocity.clone();
     let motion = Motion {
+        carrier: &carrier,
         passes: 1,
         topology,
         courant: [courant; 3],

@@ -67,7 +67,9 @@ fn step(
     } else {
         vec![1, 0]
     };
+    let carrier = velocity.clone();
     let motion = Motion {
+        carrier: &carrier,
         passes: 1,
         topology,
         courant: [courant; 2],

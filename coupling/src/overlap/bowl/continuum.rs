@@ -43,7 +43,11 @@ pub fn bed(
         fractions,
         law.in_units(units),
         [0.0, 0.0, -1.0],
-        *options,
+        SurfaceOptions {
+            // The copy is made anew at every exchange.
+            second_order: false,
+            ..*options
+        },
     )?)
 }
 

@@ -242,6 +242,8 @@ impl MaterialEdge {
         let column = spec.column(mass);
         let exchange = loads * load_time / (column.height / column.gravity).sqrt();
         let mut options = spec.options;
+        // The copy is made anew at every exchange.
+        options.second_order = false;
         if exchange < NEARLY * options.largest_step {
             options.largest_step = options.largest_step.max(copy::ROUNDED * exchange);
         }

@@ -9,7 +9,7 @@ use crate::run::surface_fields::SurfaceFields;
 use crate::scene::CliffScene;
 use crate::vtkhdf::{Cells, Frame};
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase, CollapseGround};
-use colluvium_continuum::free_surface::{CellFields, SurfaceOptions, SurfaceState};
+use colluvium_continuum::free_surface::{CellFields, History, SurfaceOptions, SurfaceState};
 use colluvium_continuum::rheology::MuI;
 use colluvium_continuum::terrain::Profile;
 use colluvium_coupling::handover::{Debris, Handed, Room};
@@ -202,17 +202,22 @@ impl Runout {
         memory.extend(h.momentum.as_flattened());
         memory.extend(h.kinetic);
         memory.extend(h.moved);
-        let rows: [&[f64]; 6] = [
+        let rows: [&[f64]; 10] = [
             &state.fractions,
             &state.velocity[0],
             &state.velocity[1],
             &state.pressure,
             state.stress.as_flattened(),
+            &state.history.lead[0],
+            &state.history.lead[1],
+            &state.history.pressure,
+            state.history.friction_change.as_flattened(),
             &[
                 state.time,
                 state.velocity_time,
                 state.next_step,
                 state.steps as f64,
+                state.history.push,
             ],
         ];
         for row in rows {
@@ -230,9 +235,9 @@ impl Runout {
             rest = after;
             Some(row.to_vec())
         };
-        let (fractions, u, w, pressure, stress, times) =
-            (take()?, take()?, take()?, take()?, take()?, take()?);
-        let &[time, velocity_time, next_step, steps] = times.as_slice() else {
+        let (fractions, u, w, pressure, stress) = (take()?, take()?, take()?, take()?, take()?);
+        let (lead, threshold, changes, times) = ([take()?, take()?], take()?, take()?, take()?);
+        let &[time, velocity_time, next_step, steps, push] = times.as_slice() else {
             return None;
         };
         let [diameter, grain_density, solid, width, begun, ..] = *head;
@@ -251,6 +256,12 @@ impl Runout {
                 velocity: [u, w],
                 pressure,
                 stress: stress.as_chunks::<2>().0.to_vec(),
+                history: History {
+                    lead,
+                    pressure: threshold,
+                    friction_change: changes.as_chunks::<2>().0.to_vec(),
+                    push,
+                },
                 time,
                 velocity_time,
                 next_step,
