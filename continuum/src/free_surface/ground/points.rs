@@ -4,7 +4,7 @@ use super::Ground;
 use super::contact::Interpolation;
 use super::cuts::MOST_PARTS;
 use crate::discretisation::QuadraturePoint;
-use crate::free_surface::faces::Face;
+use crate::free_surface::faces::{Face, weight_onto};
 use crate::free_surface::fraction::volume_in;
 use crate::free_surface::operators::{EMPTY, Material, points_of};
 use crate::free_surface::topology::NONE;
@@ -73,9 +73,15 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             let around = self.cells_around(cell, side);
             let mirrored = self.mirrored(around);
             let on_ground = self.share_on_ground(ground, corner, &mirrored);
-            let volume = match on_ground {
-                Some(share) => share * ground.part(cell, corner),
-                None => self.material_in_part(ground, cell, corner),
+            let filled = || self.material_in_part(ground, cell, corner);
+            let layer = match on_ground {
+                Some(_) => None,
+                None => self.under_layer(cell, side, 1.0 / points_of(D) as f64, filled),
+            };
+            let volume = match (on_ground, &layer) {
+                (Some(share), _) => share * ground.part(cell, corner),
+                (None, Some(layer)) => layer.volume,
+                (None, None) => filled(),
             };
             if volume <= 0.0 {
                 continue;
@@ -114,20 +120,83 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                     point.scale_rate(row, STRETCHING_ON_GROUND);
                 }
             }
-            let mut pressure = Interpolation::default();
-            for place in 0..points_of(D) {
-                let share = 1.0 / points_of(D) as f64;
-                pressure.add_all(&self.pressure_over(ground, place, &mirrored.cells), share);
+            if let Some(layer) = &layer {
+                layer.scale(&mut point);
+                point.pressure_offset = layer.pressure;
+            } else {
+                let is_level = axis == Some(D - 1);
+                let at = [on_ground.is_some(), is_level];
+                let pressure = self.pressure_at_corner(ground, corner, &mirrored, at);
+                for &(p, factor) in pressure.terms() {
+                    point.add_pressure(p, factor);
+                }
+                point.pressure_offset = pressure.known;
             }
-            for &(p, factor) in pressure.terms() {
-                point.add_pressure(p, factor);
-            }
-            point.pressure_offset = pressure.known;
             if !point.velocities().is_empty() {
                 points.push(point);
                 places.push(cell * points_of(D) + corner);
             }
         }
+    }
+
+    /// The pressure at a corner, or on the ground there: interpolated between the cells around it, and of a layer in which one
+    /// cell has a pressure, on level ground to which it sticks, the weight.
+    fn pressure_at_corner(
+        &self,
+        ground: &Ground<D>,
+        corner: usize,
+        around: &Mirrored,
+        [is_on_ground, is_level]: [bool; 2],
+    ) -> Interpolation {
+        let mut pressure = Interpolation::default();
+        let foot = if is_on_ground {
+            foot_of::<D>(ground, around.cells[0], corner)
+        } else {
+            [0.0; D]
+        };
+        let share = |place: usize| {
+            (0..D).fold(1.0, |share, axis| {
+                // Towards the middle of the cell at that place.
+                let is_low = (corner ^ place) >> axis & 1 == 1;
+                share * (0.5 + if is_low { -foot[axis] } else { foot[axis] })
+            })
+        };
+        let upwards = 1 << (D - 1);
+        for column in 0..upwards {
+            let high = column | corner & upwards;
+            let low = high ^ upwards;
+            let weight = if is_level {
+                self.weight_on_ground(around.cells[high], around.cells[low])
+            } else {
+                None
+            };
+            if let Some(weight) = weight {
+                pressure.known += (share(low) + share(high)) * weight;
+                continue;
+            }
+            for place in [low, high] {
+                let there = self.pressure_over(ground, place, &around.cells);
+                pressure.add_all(&there, share(place));
+            }
+        }
+        pressure
+    }
+
+    /// The weight on level ground, if a cell is the only one over it that has a pressure: the ground lies in it or below it.
+    /// As [`Self::weight_of_one_cell`] on a floor.
+    fn weight_on_ground(&self, cell: usize, below: usize) -> Option<f64> {
+        let last = D - 1;
+        let has_own = |cell: usize| cell != NONE && self.faces.pressure[cell] != NONE;
+        if !has_own(cell) || has_own(below) {
+            return None;
+        }
+        let above = self.topology.cell_neighbours[cell][last][1];
+        if above == NONE || has_own(above) {
+            return None;
+        }
+        let filled = |cell: usize| if cell == NONE { 0.0 } else { self.fractions[cell] };
+        let depth = filled(below) + filled(cell) + filled(above);
+        Some(weight_onto(&self.acceleration, last, 0) * depth * self.grid.axes()[last].spacing())
     }
 
     /// The same cells with mirror images beyond smooth walls of the grid, which in space are planes of symmetry.
@@ -308,6 +377,22 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             }
         }
     }
+}
+
+/// Where the ground lies next to a corner of a cell that it cuts, in cells from the corner. There the traction acts: under
+/// the pressure at the corner, up to half a cell deeper or less deep, a heap a few cells thick over level ground would end
+/// short or run on.
+fn foot_of<const D: usize>(ground: &Ground<D>, cell: usize, corner: usize) -> [f64; D] {
+    let Some(plane) = &ground.planes[cell] else {
+        return [0.0; D];
+    };
+    let mut at = [0.0; 3];
+    for (axis, side) in sides_of::<D>(corner).into_iter().enumerate() {
+        at[axis] = side as f64;
+    }
+    let square: f64 = plane.normal.iter().map(|n| n * n).sum();
+    let depth = plane.depth(at) / square;
+    std::array::from_fn(|axis| (depth * plane.normal[axis]).clamp(-0.5, 0.5))
 }
 
 /// The horizontal direction that the ground leans to in the cells that share a cell's pressure, in space; none where it is
