@@ -45,7 +45,9 @@ fn precise() -> SurfaceOptions {
         solver: PrimalDualOptions {
             strain_rate_floor: 1e-7,
             momentum_tolerance: 1e-9,
-            linear_tolerance: 1e-6,
+            linear_tolerance: 1e-9,
+            stress_tolerance: 1e-9,
+            tolerance_in_motion: 1.0,
             ..options.solver
         },
         ..options

@@ -312,7 +312,7 @@ fn run_outs_by_aspect_ratio_and_grid() {
 
 /// A whole cylinder mirrors itself across both axes and the diagonal, and a quarter across the diagonal, on
 /// whatever grid: to round-off, which the flow amplifies, if the linear systems of a step are solved that
-/// far; nearly to their tolerance if they are not.
+/// far; nearly to the tolerance of a step if they are not.
 #[test]
 fn cylinders_stay_symmetric() {
     let usual = SurfaceOptions::default().solver;
@@ -321,7 +321,7 @@ fn cylinders_stay_symmetric() {
         ..usual
     };
     for (whole, cells, solver, bound) in [
-        (true, 10, usual, 1e-5),
+        (true, 10, usual, 1e-3),
         (true, 10, exact(usual), 1e-10),
         (false, 10, exact(usual), 1e-10),
         // Grids on which material falls off a corner that has the same distance to two sides.

@@ -100,7 +100,11 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 let cells = self.topology.face_cells[component][face];
                 let ends = cells.iter().any(|&cell| self.fractions[cell] <= EMPTY);
                 // An empty cell has no points: those of the other one stand for it.
-                *volume = if ends && side[last] == 0 { 2.0 * share } else { share };
+                *volume = if ends && side[last] == 0 {
+                    2.0 * share
+                } else {
+                    share
+                };
             }
         }
         let volume = volumes.into_iter().fold(0.0, f64::max);

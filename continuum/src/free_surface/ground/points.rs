@@ -194,7 +194,13 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         if above == NONE || has_own(above) {
             return None;
         }
-        let filled = |cell: usize| if cell == NONE { 0.0 } else { self.fractions[cell] };
+        let filled = |cell: usize| {
+            if cell == NONE {
+                0.0
+            } else {
+                self.fractions[cell]
+            }
+        };
         let depth = filled(below) + filled(cell) + filled(above);
         Some(weight_onto(&self.acceleration, last, 0) * depth * self.grid.axes()[last].spacing())
     }
