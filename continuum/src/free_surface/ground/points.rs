@@ -1,10 +1,10 @@
 //! Strain rates at the quadrature points of material over ground, by Gauss' theorem on what is free of it.
 
-use super::Ground;
 use super::contact::Interpolation;
 use super::cuts::MOST_PARTS;
+use super::{Ground, unit};
 use crate::discretisation::QuadraturePoint;
-use crate::free_surface::faces::{Face, weight_onto};
+use crate::free_surface::faces::Face;
 use crate::free_surface::fraction::volume_in;
 use crate::free_surface::operators::{EMPTY, Material, points_of};
 use crate::free_surface::topology::NONE;
@@ -124,9 +124,8 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 layer.scale(&mut point);
                 point.pressure_offset = layer.pressure;
             } else {
-                let is_level = axis == Some(D - 1);
-                let at = [on_ground.is_some(), is_level];
-                let pressure = self.pressure_at_corner(ground, corner, &mirrored, at);
+                let press = on_ground.map(|_| self.press_on_ground(ground, cell, axis));
+                let pressure = self.pressure_at_corner(ground, corner, &mirrored, press);
                 for &(p, factor) in pressure.terms() {
                     point.add_pressure(p, factor);
                 }
@@ -139,17 +138,17 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         }
     }
 
-    /// The pressure at a corner, or on the ground there: interpolated between the cells around it, and of a layer in which one
-    /// cell has a pressure, on level ground to which it sticks, the weight.
+    /// The pressure at a corner, or on the ground there, which bears a press: interpolated between the cells around it, and of
+    /// a layer in which one cell has a pressure its weight.
     fn pressure_at_corner(
         &self,
         ground: &Ground<D>,
         corner: usize,
         around: &Mirrored,
-        [is_on_ground, is_level]: [bool; 2],
+        press: Option<f64>,
     ) -> Interpolation {
         let mut pressure = Interpolation::default();
-        let foot = if is_on_ground {
+        let foot = if press.is_some() {
             foot_of::<D>(ground, around.cells[0], corner)
         } else {
             [0.0; D]
@@ -165,12 +164,10 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         for column in 0..upwards {
             let high = column | corner & upwards;
             let low = high ^ upwards;
-            let weight = if is_level {
-                self.weight_on_ground(around.cells[high], around.cells[low])
-            } else {
-                None
-            };
-            if let Some(weight) = weight {
+            let depth = press.filter(|press| *press > 0.0).and_then(|press| {
+                Some(press * self.depth_of_one_cell(around.cells[high], around.cells[low])?)
+            });
+            if let Some(weight) = depth {
                 pressure.known += (share(low) + share(high)) * weight;
                 continue;
             }
@@ -182,9 +179,26 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         pressure
     }
 
-    /// The weight on level ground, if a cell is the only one over it that has a pressure: the ground lies in it or below it.
-    /// As [`Self::weight_of_one_cell`] on a floor.
-    fn weight_on_ground(&self, cell: usize, below: usize) -> Option<f64> {
+    /// What matter weighs on the ground in a cell per height of its column, |g·n| n_z, if it sticks there to ground whose
+    /// normal n leans upwards most, in it or on its face across an axis; else nothing.
+    fn press_on_ground(&self, ground: &Ground<D>, cell: usize, across: Option<usize>) -> f64 {
+        let last = D - 1;
+        let mut normal = unit(ground.wall[cell]);
+        if normal == [0.0; D] && across == Some(last) {
+            normal[last] = 1.0;
+        }
+        let leans_up = normal.iter().all(|n| n.abs() <= normal[last]);
+        if ground.contact.slides() || !leans_up {
+            return 0.0;
+        }
+        let pairs = self.acceleration.iter().zip(normal);
+        let towards = pairs.fold(0.0, |sum, (g, n)| sum - g * n);
+        towards.max(0.0) * normal[last]
+    }
+
+    /// Height of the matter in a column of which a cell is the only one that has a pressure: the ground lies in it or below it.
+    /// See [`Self::weight_of_one_cell`], on a floor.
+    fn depth_of_one_cell(&self, cell: usize, below: usize) -> Option<f64> {
         let last = D - 1;
         let has_own = |cell: usize| cell != NONE && self.faces.pressure[cell] != NONE;
         if !has_own(cell) || has_own(below) {
@@ -202,7 +216,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             }
         };
         let depth = filled(below) + filled(cell) + filled(above);
-        Some(weight_onto(&self.acceleration, last, 0) * depth * self.grid.axes()[last].spacing())
+        Some(depth * self.grid.axes()[last].spacing())
     }
 
     /// The same cells with mirror images beyond smooth walls of the grid, which in space are planes of symmetry.
