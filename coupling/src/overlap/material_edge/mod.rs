@@ -35,12 +35,15 @@ mod rows;
 mod totals;
 mod travel;
 mod watch;
+mod witness;
 
 pub use account::{Account, Monitors};
 pub use cells::Cells;
 pub use travel::{Move, Travel};
+pub use witness::{Through, Witness};
 
 use super::OverlapError;
+use super::rest_stress::RestStress;
 use super::settings::Resolved;
 use super::sighting::{Sighting, free_grains, free_mass};
 use cells::Sums;
@@ -212,6 +215,7 @@ impl MaterialEdge {
         edge.account.mass = total;
         // Stresses as they are while all grains are still there.
         edge.sum_up(1.0);
+        edge.remember_rest();
         if let Some(travel) = spec.travel {
             edge.put_by(&travel, simulation);
         }
@@ -266,7 +270,14 @@ impl MaterialEdge {
             },
             journey: Journey::default(),
             sums: Sums::nothing(&cells),
-            view: View::default(),
+            view: View {
+                rest: RestStress {
+                    active: (1.0 - spec.case.rheology.mu_s).max(0.0)
+                        / (1.0 + spec.case.rheology.mu_s),
+                    ..RestStress::nothing(cells.count(), spec.settings.rest_strain)
+                },
+                ..View::default()
+            },
             held: Held {
                 accelerations: vec![[0.0; 2]; cells.count()],
                 rows: vec![Row::default(); cells.counts[1]],
@@ -291,6 +302,24 @@ impl MaterialEdge {
         })
     }
 
+    /// Takes K_0 from the stresses of the grains that become continuum or overlap.
+    fn remember_rest(&mut self) {
+        let end = self.spec.place + self.spec.zones()[1];
+        let columns = self.cells.counts[0];
+        let cells = self.sums.stress.iter().enumerate();
+        let behind = cells.filter(|(cell, _)| self.cells.centre(cell % columns) < end);
+        let [across, down] = behind.fold([0.0; 2], |sum, (_, s)| [sum[0] + s[0], sum[1] + s[1]]);
+        self.view.rest.measure(across, down);
+    }
+
+    /// Ratio of sideways to vertical stress that the continuum remembers, K_0; 1 where it remembers nothing.
+    pub fn rest_ratio(&self) -> f64 {
+        match self.spec.settings.rest_strain > 0.0 {
+            true => self.view.rest.ratio,
+            false => 1.0,
+        }
+    }
+
     /// Label of a free grain from that of the edge (m); none of what has none.
     pub fn label(&self, grain: &GrainSample) -> Option<f64> {
         self.labels.of(grain)
@@ -299,9 +328,7 @@ impl MaterialEdge {
     /// Whether totals count a grain: it lies in front of the handshake surface, whose other side they count as
     /// continuum. By its label it would be counted where the continuum is too, once labels have mixed.
     pub fn counts(&self, grain: &GrainSample) -> bool {
-        let row = (grain.position.z / self.cells.spacing).max(0.0) as usize;
-        let row = row.min(self.held.handshake.len() - 1);
-        self.label(grain).is_some() && grain.position.x >= self.held.handshake[row]
+        self.label(grain).is_some() && witness::is_before(grain, &self.cells, &self.held.handshake)
     }
 
     /// The continuum.

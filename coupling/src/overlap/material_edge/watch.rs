@@ -2,7 +2,9 @@
 
 use super::MaterialEdge;
 use super::cells::over;
-use colluvium_dem::GrainSample;
+use super::exchange::STEEPEST;
+use super::rows::slopes;
+use super::witness::Through;
 
 /// How far beyond the edge a grain has escaped, in diameters.
 const ESCAPED: f64 = 1.0;
@@ -17,12 +19,15 @@ impl MaterialEdge {
         self.monitors.impulse[1] += traction * self.exchange_time();
     }
 
-    /// Force along x (N) of the contacts that cross the handshake surface. Averages over cells would be too low by what the
+    /// What goes through the handshake surface as grains. Averages over cells would be too low by what the
     /// shell, which bears forces from outside, has of them.
-    fn through_handshake(&self) -> f64 {
-        let inside = |g: &GrainSample| self.labels.of(g).map(|_| self.counts(g));
-        let crossing = self.sighting.crossing(inside);
-        crossing.map(|(_, force)| force.x).sum()
+    fn through_handshake(&self) -> Through {
+        Through::of(
+            &self.sighting,
+            (&self.labels, &self.cells),
+            (&self.held.handshake, self.spec.settings.buffer),
+            self.spec.case.rheology.diameter,
+        )
     }
 
     /// Looks at both sides of the handshake surface.
@@ -30,9 +35,10 @@ impl MaterialEdge {
         let d = self.spec.case.rheology.diameter;
         let columns = self.cells.counts[0];
         let (mut slips, mut weights) = (0.0, 0.0);
-        let mut pressed = 0.0;
+        let (mut pressed, mut leaning) = (0.0, 0.0);
+        let slopes = slopes(&self.held.handshake, &self.cells);
         for (k, &place) in self.held.handshake.iter().enumerate() {
-            let Some((fraction, [xx, _, _], _)) = self.view.across(&self.cells, place, k) else {
+            let Some((fraction, [xx, _, xz], _)) = self.view.across(&self.cells, place, k) else {
                 continue;
             };
             let at = self.cells.offset(place);
@@ -50,9 +56,43 @@ impl MaterialEdge {
                 }
             }
             pressed -= fraction * xx;
+            leaning += fraction * xz * slopes[k].clamp(-STEEPEST, STEEPEST);
         }
         let area = self.cells.spacing * self.spec.slab;
         let through = self.through_handshake();
+        if std::env::var_os("JOINT_DEBUG").is_some() {
+            let tr: f64 = self.held.rows.iter().map(|r| r.traction[0]).sum();
+            let zone: f64 = self.laid.relaxation.iter().map(|f| f[0]).sum();
+            eprintln!(
+                "H {:.4} {:.3} {:.3} {:.3} {:.3} {:.3} {:.3} {:.3}",
+                self.exchanges as f64 * self.exchange_time(),
+                through.contacts,
+                through.kinetic,
+                pressed * area,
+                leaning * area,
+                tr,
+                self.laid.impedance[0],
+                zone
+            );
+            for g in &self.sighting.snapshot.grains {
+                let row = self.cells.rows(g.position.z)[0].0;
+                let place = self.held.rows[row].place;
+                if self.labels.of(g).is_some() && g.position.x < place - d {
+                    eprintln!(
+                        "E {:.3} id {} x {:.3} z {:.3} row {row} place {place:.3} label {:?} v {:.3} {:.3} top {} places {:.2?}",
+                        self.exchanges as f64 * self.exchange_time(),
+                        g.id,
+                        g.position.x,
+                        g.position.z,
+                        self.labels.of(g),
+                        g.velocity.x,
+                        g.velocity.z,
+                        self.embedded(g).weight,
+                        self.held.rows.iter().map(|r| r.place).collect::<Vec<_>>()
+                    );
+                }
+            }
+        }
         let slip = over(slips, weights).sqrt();
         let full = self.full();
         let (mut packed, mut cells) = (0.0, 0.0);
@@ -74,8 +114,8 @@ impl MaterialEdge {
         m.exchanges += 1.0;
         m.slip += slip;
         m.largest_slip = m.largest_slip.max(slip);
-        m.force[0] += through;
-        m.force[1] += pressed * area;
+        m.force[0] += through.sum();
+        m.force[1] += (pressed + leaning) * area;
         m.packing += over(packed, cells);
         m.escaped = m.escaped.max(escaped);
     }
