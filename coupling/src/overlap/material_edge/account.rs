@@ -147,7 +147,7 @@ pub struct Monitors {
     pub packing: f64,
     /// Σ |impulse| of the relaxation, cell by cell, and of the traction, row by row (N s).
     pub impulse: [f64; 2],
-    /// Most grains beyond the edge by more than a diameter.
+    /// Most grains beyond the edge by more than a diameter along its normal.
     pub escaped: f64,
     /// Grains times their steps.
     pub grain_steps: f64,

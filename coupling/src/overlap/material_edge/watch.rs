@@ -5,6 +5,7 @@ use super::cells::over;
 use super::exchange::STEEPEST;
 use super::rows::slopes;
 use super::witness::Through;
+use colluvium_dem::GrainSample;
 
 /// How far beyond the edge a grain has escaped, in diameters.
 const ESCAPED: f64 = 1.0;
@@ -30,9 +31,23 @@ impl MaterialEdge {
         )
     }
 
+    /// How many grains lie beyond the edge by more than a diameter, along its normal: where it leans, material at rest below what
+    /// has moved lies far behind it along x and close to it all the same.
+    fn escaped(&self) -> usize {
+        let d = self.spec.case.rheology.diameter;
+        let places: Vec<f64> = self.held.rows.iter().map(|row| row.place).collect();
+        let slopes = slopes(&places, &self.cells);
+        let far = |g: &&GrainSample| {
+            let rows = self.cells.rows(g.position.z);
+            let at = |of: &[f64]| rows.iter().map(|&(row, hat)| hat * of[row]).sum::<f64>();
+            let behind = (at(&places) - g.position.x) / 1.0_f64.hypot(at(&slopes));
+            self.labels.of(g).is_some() && behind > ESCAPED * d
+        };
+        self.sighting.snapshot.grains.iter().filter(far).count()
+    }
+
     /// Looks at both sides of the handshake surface.
     pub(super) fn watch(&mut self) {
-        let d = self.spec.case.rheology.diameter;
         let columns = self.cells.counts[0];
         let (mut slips, mut weights) = (0.0, 0.0);
         let (mut pressed, mut leaning) = (0.0, 0.0);
@@ -60,39 +75,6 @@ impl MaterialEdge {
         }
         let area = self.cells.spacing * self.spec.slab;
         let through = self.through_handshake();
-        if std::env::var_os("JOINT_DEBUG").is_some() {
-            let tr: f64 = self.held.rows.iter().map(|r| r.traction[0]).sum();
-            let zone: f64 = self.laid.relaxation.iter().map(|f| f[0]).sum();
-            eprintln!(
-                "H {:.4} {:.3} {:.3} {:.3} {:.3} {:.3} {:.3} {:.3}",
-                self.exchanges as f64 * self.exchange_time(),
-                through.contacts,
-                through.kinetic,
-                pressed * area,
-                leaning * area,
-                tr,
-                self.laid.impedance[0],
-                zone
-            );
-            for g in &self.sighting.snapshot.grains {
-                let row = self.cells.rows(g.position.z)[0].0;
-                let place = self.held.rows[row].place;
-                if self.labels.of(g).is_some() && g.position.x < place - d {
-                    eprintln!(
-                        "E {:.3} id {} x {:.3} z {:.3} row {row} place {place:.3} label {:?} v {:.3} {:.3} top {} places {:.2?}",
-                        self.exchanges as f64 * self.exchange_time(),
-                        g.id,
-                        g.position.x,
-                        g.position.z,
-                        self.labels.of(g),
-                        g.velocity.x,
-                        g.velocity.z,
-                        self.embedded(g).weight,
-                        self.held.rows.iter().map(|r| r.place).collect::<Vec<_>>()
-                    );
-                }
-            }
-        }
         let slip = over(slips, weights).sqrt();
         let full = self.full();
         let (mut packed, mut cells) = (0.0, 0.0);
@@ -104,12 +86,7 @@ impl MaterialEdge {
                 cells += 1.0;
             }
         }
-        let places: Vec<f64> = self.held.rows.iter().map(|row| row.place).collect();
-        let escaped = self.sighting.snapshot.grains.iter().filter(|g| {
-            let row = self.cells.rows(g.position.z)[0].0;
-            self.labels.of(g).is_some() && g.position.x < places[row] - ESCAPED * d
-        });
-        let escaped = escaped.count() as f64;
+        let escaped = self.escaped() as f64;
         let m = &mut self.monitors;
         m.exchanges += 1.0;
         m.slip += slip;

@@ -324,7 +324,7 @@ impl JoinedColumn<'_> {
                 "grains_escaped",
                 monitors.escaped,
                 0.0,
-                "most grains beyond the edge by more than a diameter, at any exchange",
+                "most grains beyond the edge by more than a diameter along its normal, at any exchange",
             ),
         ] {
             summary.put(name, Quantity::new(value, "1").against(right, source));
