@@ -58,7 +58,11 @@ impl JoinedColumn<'_> {
         if let Ok(s) = scene.overlap_settings(&self.origin) {
             lines.push((
                 "overlap".into(),
-                format!("from the edge into the grains: {}", overlap_words(&s, d)),
+                format!(
+                    "from the edge into the grains: {}, sideways pressure at rest forgotten in a strain of {}",
+                    overlap_words(&s, d),
+                    s.rest_strain
+                ),
             ));
         }
         let law = match scene.grains.calibrated.word() {
@@ -387,6 +391,11 @@ impl JoinedColumn<'_> {
                 monitors.escaped,
             ),
         ];
+        let on_forces = "Overlap: below yield a continuum's sideways stress is its law's own: what the joint does to its grains is force_of_grains \
+                         over that of a run with model = \"dem\".";
+        if misses[1].0 {
+            summary.remarks.push(on_forces.into());
+        }
         for (_, what, value) in misses.into_iter().filter(|(misses, ..)| *misses) {
             summary
                 .remarks
