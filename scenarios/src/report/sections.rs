@@ -41,7 +41,8 @@ pub fn plots(record: &Record) -> Markup {
 /// The error against one of the keys that vary, a line for each combination of the others.
 fn by_key(table: &Table, keys: &[&str], key: &str) -> Plot {
     let others: Vec<&str> = keys.iter().copied().filter(|other| *other != key).collect();
-    let mut lines: Vec<(Vec<f64>, Vec<(f64, f64)>)> = Vec::new();
+    type Points = Vec<(f64, f64)>;
+    let mut lines: Vec<(Vec<f64>, Points)> = Vec::new();
     let pairs = table.column(key).iter().zip(table.column("error"));
     for (row, (x, error)) in pairs.enumerate() {
         let at: Vec<f64> = others.iter().map(|k| table.column(k)[row]).collect();
