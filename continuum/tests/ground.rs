@@ -253,7 +253,6 @@ fn bagnold_flow_on_cut_inclines() {
         let errors = [8, 16, 32].map(|cells| bagnold(cells, incline, tilt, Contact::NoSlip));
         let observed = (errors[0] / errors[2]).log2() / 2.0;
         println!("{incline:?} at {tilt}: {errors:?}, order {observed:.2}");
-        println!("{incline:?} at {tilt}: {errors:?}, order {observed:.2}");
         assert!(
             errors[2] < most && observed > order,
             "{incline:?}: {errors:?}, order {observed}"

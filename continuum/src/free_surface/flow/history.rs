@@ -9,7 +9,7 @@
 //! s − ½ Δt p ∂m/∂t,    ∂m/∂t = (m_n − m_{n−1})/Δt_n,    m = s/p,
 //! ```
 //!
-//! and the difference is a load of the step. For u′ = λu with λΔt → −∞ both roots of this scheme have |ξ|² = ½.
+//! and the difference is a load of the step. For u′ = λu with λΔt → −∞ both roots of this scheme have |ξ|² = ½ if steps are alike, r/2 for steps that grow by r.
 //!
 //! Momentum moves from the positions at t_n to those at t_{n+1}, so what is carried is the velocity w that matter has when
 //! it passes t_n, and what carries it is the field of the middle of the step, c = w − ½ Δt (u·∇)u: the velocity of the
@@ -61,8 +61,8 @@ impl<const D: usize, const C: usize> History<D, C> {
     pub(super) fn fits(&self, faces: impl Fn(usize) -> usize, stresses: usize) -> bool {
         let fits = |found: usize, expected: usize| found == 0 || found == expected;
         (0..D).all(|c| fits(self.lead[c].len(), faces(c)))
-            && fits(self.pressure.len(), stresses)
             && fits(self.friction_change.len(), stresses)
+            && self.pressure.len() == self.friction_change.len()
     }
 
     /// Adds the load by which the stress of the middle of `dt` differs from that of its end.
@@ -106,7 +106,8 @@ impl<const D: usize, const C: usize> History<D, C> {
             if p > PRESSURE_FLOOR && earlier > PRESSURE_FLOOR {
                 let old = before[place];
                 let change: [f64; C] = std::array::from_fn(|a| s[a] / p - old[a] / earlier);
-                // Cohesion and viscosity leave a stress where there is hardly a pressure, so that s/p has no bound.
+                // Cohesion and viscosity leave a stress where there is hardly a pressure, so that s/p has no bound; where
+                // stress passes through zero the bound holds the change back, too.
                 let (size, most) = (p * squared_norm(&change).sqrt(), squared_norm(s).sqrt());
                 let part = if size > most { most / size } else { 1.0 };
                 self.friction_change[place] = change.map(|change| part * change);

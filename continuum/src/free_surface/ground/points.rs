@@ -86,8 +86,10 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             if volume <= 0.0 {
                 continue;
             }
+            // A layer rubs along its sides with what there is of it.
+            let beside = if layer.is_some() { filled() } else { volume };
             if let Some(walls) = self.side_walls
-                && let Some(point) = self.rubbing_over(ground, walls, cell, side, volume)
+                && let Some(point) = self.rubbing_over(ground, walls, cell, side, beside)
             {
                 points.push(point);
                 places.push((self.fractions.len() + cell) * points_of(D) + corner);
