@@ -211,7 +211,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                 }
             }
         }
-        self.state.history.drop_lead(&faces);
+        self.state.history.drop_lead(faces);
         faces.spread(&self.unknowns.u, &mut self.state.velocity);
         if let Some(inflow) = &self.inflow {
             inflow.impose(&self.topology, &mut self.state.velocity);
