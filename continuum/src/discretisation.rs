@@ -7,9 +7,16 @@
 //! the root of γ̇. The stress of the point is s = ((τ_xx − τ_zz)/2, τ_xz), and Σ W s·γ is the
 //! dissipated power.
 
-use crate::grid::{Axis, Boundary, DIMENSIONS, Grid};
+mod corners;
+mod point;
+
+pub(crate) use corners::{VelocityAt, add_corner_shear};
+pub use point::QuadraturePoint;
+
+use crate::grid::{DIMENSIONS, Grid};
 use crate::linear_solver::Place;
 use crate::wall_friction::{PointLaw, SideWalls};
+use corners::{normal_faces, push_points};
 
 /// Components of the strain rate (and of the deviatoric stress) in a plane flow.
 pub const COMPONENTS: usize = 2;
@@ -27,194 +34,6 @@ pub enum ThresholdPressure {
     /// The pressure of the cell, as codes with a viscosity in cells do: about twenty times the
     /// error in Bagnold flow. Kept for comparison.
     Cell,
-}
-
-/// A pair of a cell and a corner, with its rows of the strain-rate and interpolation operators.
-#[derive(Debug, Clone)]
-pub struct QuadraturePoint<const C: usize = COMPONENTS, const V: usize = VELOCITIES> {
-    /// Share of the cell's volume.
-    pub(crate) weight: f64,
-    velocities: [usize; V],
-    velocity_count: usize,
-    rates: [[f64; V]; C],
-    /// Strain rate due to moving walls.
-    offset: [f64; C],
-    pressures: [usize; V],
-    pressure_count: usize,
-    pressure_weights: [f64; V],
-    /// Part of the threshold pressure that is known beforehand.
-    pub(crate) pressure_offset: f64,
-    /// The boundary across z on which the corner lies: 0 low, 1 high.
-    pub(crate) side: Option<usize>,
-    /// Whose threshold holds here.
-    pub(crate) law: PointLaw,
-}
-
-impl<const C: usize, const V: usize> QuadraturePoint<C, V> {
-    pub(crate) fn new(weight: f64) -> Self {
-        Self {
-            weight,
-            velocities: [0; V],
-            velocity_count: 0,
-            rates: [[0.0; V]; C],
-            offset: [0.0; C],
-            pressures: [0; V],
-            pressure_count: 0,
-            pressure_weights: [0.0; V],
-            pressure_offset: 0.0,
-            side: None,
-            law: PointLaw::Material,
-        }
-    }
-
-    pub(crate) fn add_velocity(&mut self, unknown: usize, component: usize, coefficient: f64) {
-        let known = &self.velocities[..self.velocity_count];
-        let slot = known
-            .iter()
-            .position(|&v| v == unknown)
-            .unwrap_or(self.velocity_count);
-        if slot == self.velocity_count {
-            self.velocities[slot] = unknown;
-            self.velocity_count += 1;
-        }
-        self.rates[component][slot] += coefficient;
-    }
-
-    /// The same point of a problem in which only some unknowns are left, by their new numbers; the others keep the
-    /// values given.
-    pub(crate) fn restricted(
-        &self,
-        velocities: &[Option<usize>],
-        cells: &[Option<usize>],
-        u: &[f64],
-        p: &[f64],
-    ) -> Self {
-        let mut point = Self {
-            offset: self.offset,
-            pressure_offset: self.pressure_offset,
-            side: self.side,
-            law: self.law,
-            ..Self::new(self.weight)
-        };
-        for (slot, &j) in self.velocities().iter().enumerate() {
-            for component in 0..C {
-                let rate = self.rates[component][slot];
-                match velocities[j] {
-                    Some(unknown) => point.add_velocity(unknown, component, rate),
-                    None => point.offset[component] += rate * u[j],
-                }
-            }
-        }
-        let (known, weights) = self.pressures();
-        for (&cell, weight) in known.iter().zip(weights) {
-            match cells[cell] {
-                Some(unknown) => point.add_pressure(unknown, *weight),
-                None => point.pressure_offset += weight * p[cell],
-            }
-        }
-        point
-    }
-
-    /// Multiplies a component of the strain rate.
-    pub(crate) fn scale_rate(&mut self, component: usize, factor: f64) {
-        for rate in &mut self.rates[component] {
-            *rate *= factor;
-        }
-        self.offset[component] *= factor;
-    }
-
-    /// Adds to the strain rate what a given velocity contributes.
-    pub(crate) fn add_known_rate(&mut self, component: usize, rate: f64) {
-        self.offset[component] += rate;
-    }
-
-    pub(crate) fn add_pressure(&mut self, cell: usize, weight: f64) {
-        let known = &self.pressures[..self.pressure_count];
-        let slot = known
-            .iter()
-            .position(|&c| c == cell)
-            .unwrap_or(self.pressure_count);
-        if slot == self.pressure_count {
-            if slot == V {
-                // No room for one more, which only a surface torn to shreds asks for: the nearest stands
-                // for it.
-                self.pressure_weights[0] += weight;
-                return;
-            }
-            self.pressures[slot] = cell;
-            self.pressure_count += 1;
-        }
-        self.pressure_weights[slot] += weight;
-    }
-
-    /// The velocities that the point depends on.
-    #[inline]
-    pub(crate) fn velocities(&self) -> &[usize] {
-        &self.velocities[..self.velocity_count]
-    }
-
-    /// ∂γ_c/∂u for each of [`velocities`](Self::velocities).
-    pub(crate) fn rates(&self, component: usize) -> &[f64] {
-        &self.rates[component][..self.velocity_count]
-    }
-
-    /// Cells from which the threshold pressure is interpolated, and their weights.
-    #[inline]
-    pub(crate) fn pressures(&self) -> (&[usize], &[f64]) {
-        (
-            &self.pressures[..self.pressure_count],
-            &self.pressure_weights[..self.pressure_count],
-        )
-    }
-
-    /// Strain rate, walls included.
-    #[inline]
-    pub(crate) fn strain_rate(&self, u: &[f64]) -> [f64; C] {
-        let mut rate = self.strain_rate_change(u);
-        for (rate, offset) in rate.iter_mut().zip(self.offset) {
-            *rate += offset;
-        }
-        rate
-    }
-
-    /// Power of a stress per volume by one of the velocities: the force on it.
-    #[inline]
-    pub(crate) fn force(&self, slot: usize, stress: &[f64; C]) -> f64 {
-        let mut force = self.rates[0][slot] * stress[0];
-        for (rates, s) in self.rates[1..].iter().zip(&stress[1..]) {
-            force += rates[slot] * s;
-        }
-        force
-    }
-
-    /// Strain rate of a change of velocity, to which walls do not contribute.
-    #[inline]
-    pub(crate) fn strain_rate_change(&self, u: &[f64]) -> [f64; C] {
-        let mut gamma = [0.0; C];
-        for (slot, &v) in self.velocities().iter().enumerate() {
-            for (gamma, rates) in gamma.iter_mut().zip(&self.rates) {
-                *gamma += rates[slot] * u[v];
-            }
-        }
-        gamma
-    }
-
-    /// Threshold pressure, not yet cut at zero.
-    #[inline]
-    pub(crate) fn pressure(&self, p: &[f64]) -> f64 {
-        self.pressure_offset + self.pressure_change(p)
-    }
-
-    /// Threshold pressure of a change of pressure.
-    #[inline]
-    pub(crate) fn pressure_change(&self, p: &[f64]) -> f64 {
-        let (cells, weights) = self.pressures();
-        cells
-            .iter()
-            .zip(weights)
-            .map(|(&c, w)| w * p[c])
-            .sum::<f64>()
-    }
 }
 
 /// The discrete operators of one grid, in units with ρ = 1.
@@ -383,7 +202,7 @@ impl<const D: usize, const C: usize, const V: usize> Discretisation<D, C, V> {
             pattern.extend([cell, velocity]);
         }
         for point in &self.points {
-            pattern.extend([point.velocity_count, point.pressure_count]);
+            pattern.extend([point.velocities().len(), point.pressures().0.len()]);
             pattern.extend(point.velocities());
             pattern.extend(point.pressures().0);
         }
@@ -462,164 +281,10 @@ impl<const D: usize, const C: usize, const V: usize> Discretisation<D, C, V> {
     }
 }
 
-/// The unknowns on the low and high faces of a cell normal to an axis, with their signs.
-fn normal_faces(
-    grid: &Grid,
-    axis: usize,
-    cell: [usize; DIMENSIONS],
-) -> impl Iterator<Item = (usize, f64)> {
-    let faces = grid.axes()[axis].faces_of_cell(cell[axis]);
-    faces.into_iter().flat_map(move |pair| {
-        [(pair[0], -1.0), (pair[1], 1.0)]
-            .into_iter()
-            .filter_map(move |(face, sign)| {
-                let mut index = cell;
-                index[axis] = face;
-                grid.unknown(axis, index).map(|unknown| (unknown, sign))
-            })
-    })
-}
-
-/// Adds the quadrature points of one cell, one for each corner.
-fn push_points(
-    grid: &Grid,
-    cell: [usize; DIMENSIONS],
-    threshold_pressure: ThresholdPressure,
-    points: &mut Vec<QuadraturePoint>,
-) {
-    let sides = |axis: usize| match grid.axes()[axis].faces_of_cell(cell[axis]) {
-        None => vec![0],
-        Some(pair) => pair.to_vec(),
-    };
-    let (xs, zs) = (sides(0), sides(1));
-    let weight = grid.cell_volume() / (xs.len() * zs.len()) as f64;
-    for &fz in &zs {
-        for &fx in &xs {
-            let mut point = QuadraturePoint::new(weight);
-            for (axis, orientation) in [(0, 1.0), (1, -1.0)] {
-                for (unknown, sign) in normal_faces(grid, axis, cell) {
-                    let rate = orientation * sign / grid.axes()[axis].spacing();
-                    point.add_velocity(unknown, 0, rate);
-                }
-            }
-            let velocity_at = |component: usize, face| {
-                let unknown = grid.unknown(component, face);
-                unknown.map_or(VelocityAt::Zero, VelocityAt::Unknown)
-            };
-            add_corner_shear(grid, velocity_at, [fx, fz], [0, 1], 1, &mut point);
-            match threshold_pressure {
-                ThresholdPressure::Corner => add_corner_pressure(grid, [fx, fz], &mut point),
-                ThresholdPressure::Cell => point.add_pressure(grid.cell(cell), 1.0),
-            }
-            point.side = grid.axes()[1].boundary_at(fz).map(|_| usize::from(fz > 0));
-            for (axis, face) in [(0, fx), (1, fz)] {
-                if let Some(Boundary::CoulombWall { friction, .. }) =
-                    grid.axes()[axis].boundary_at(face)
-                {
-                    point.law = PointLaw::OnWall(friction);
-                }
-            }
-            points.push(point);
-        }
-    }
-}
-
-/// What an operator finds on a face.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub(crate) enum VelocityAt {
-    /// An unknown.
-    Unknown(usize),
-    /// A wall.
-    Zero,
-    /// No material near: there is no velocity to take a difference with.
-    Nowhere,
-}
-
-/// Adds γ = ∂u/∂z + ∂w/∂x (for the axes x, z of the `plane`) to component `row` of a point, at the corner
-/// of faces across these axes; along others `corner` is a cell. A rough wall acts through a mirrored
-/// velocity outside it; where a side of the corner cannot hold shear, γ is left at zero and carries no
-/// stress.
-pub(crate) fn add_corner_shear<const D: usize, const C: usize, const V: usize>(
-    grid: &Grid<D>,
-    velocity_at: impl Fn(usize, [usize; D]) -> VelocityAt,
-    corner: [usize; D],
-    plane: [usize; 2],
-    row: usize,
-    point: &mut QuadraturePoint<C, V>,
-) {
-    let axes = grid.axes();
-    let smooth = |axis: usize| {
-        axes[axis]
-            .boundary_at(corner[axis])
-            .is_some_and(|side| side.wall_velocity().is_none())
-    };
-    if smooth(plane[0]) || smooth(plane[1]) {
-        return;
-    }
-    for [along, component] in [[plane[0], plane[1]], [plane[1], plane[0]]] {
-        // ∂u_component/∂x_along
-        if axes[along] == Axis::Flat {
-            continue;
-        }
-        let inverse = 1.0 / axes[along].spacing();
-        let wall = axes[along]
-            .boundary_at(corner[along])
-            .and_then(|side| side.wall_velocity());
-        let found = axes[along].cells_at_face(corner[along]).map(|position| {
-            position.map(|position| {
-                let mut face = corner;
-                face[along] = position;
-                velocity_at(component, face)
-            })
-        });
-        if found.contains(&Some(VelocityAt::Nowhere)) {
-            continue;
-        }
-        for (found, sign) in found.into_iter().zip([-1.0, 1.0]) {
-            // The mirrored velocity 2 U − u doubles the difference across half a cell.
-            let factor = if wall.is_some() { 2.0 } else { 1.0 };
-            if let Some(VelocityAt::Unknown(unknown)) = found {
-                point.add_velocity(unknown, row, factor * sign * inverse);
-                // A wall moves along the first of its axes.
-                if component == usize::from(along == 0) {
-                    point.offset[row] -= factor * sign * inverse * wall.unwrap_or(0.0);
-                }
-            }
-        }
-    }
-}
-
-/// Adds the linear interpolation of pressure to a corner: halves inside, extrapolation
-/// (3 p₁ − p₂)/2 at walls, nothing (p = 0) at a free surface.
-fn add_corner_pressure(grid: &Grid, corner: [usize; DIMENSIONS], point: &mut QuadraturePoint) {
-    let along = |direction: usize| -> Vec<(usize, f64)> {
-        let (axis, face) = (&grid.axes()[direction], corner[direction]);
-        let cells = axis.cells();
-        match (axis, axis.boundary_at(face)) {
-            (Axis::Flat, _) => vec![(0, 1.0)],
-            (_, Some(Boundary::FreeSurface)) => vec![],
-            (_, Some(_)) if cells == 1 => vec![(0, 1.0)],
-            (_, Some(_)) if face == 0 => vec![(0, 1.5), (1, -0.5)],
-            (_, Some(_)) => vec![(cells - 1, 1.5), (cells - 2, -0.5)],
-            (_, None) => axis
-                .cells_at_face(face)
-                .into_iter()
-                .flatten()
-                .map(|cell| (cell, 0.5))
-                .collect(),
-        }
-    };
-    let xs = along(0);
-    for (k, wz) in along(1) {
-        for &(i, wx) in &xs {
-            point.add_pressure(grid.cell([i, k]), wx * wz);
-        }
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::grid::{Axis, Boundary};
 
     fn bounded(length: f64, cells: usize, low: Boundary, high: Boundary) -> Axis {
         Axis::Bounded {

@@ -245,13 +245,15 @@ fn bagnold(cells: usize, incline: [usize; 2], tilt: f64, contact: Contact) -> f6
 #[test]
 fn bagnold_flow_on_cut_inclines() {
     for (incline, tilt, most, order) in [
-        ([1, 8], 0.3, 4e-3, 1.7),
-        ([7, 16], 0.0, 2.3e-3, 1.3),
-        ([8, 8], -0.35, 3e-3, 1.7),
+        ([1, 8], 0.3, 2e-3, 1.9),
+        ([7, 16], 0.0, 2e-3, 1.0),
+        ([8, 8], -0.35, 2.6e-3, 1.2),
         ([16, 8], -0.65, 4.2e-3, 1.7),
     ] {
         let errors = [8, 16, 32].map(|cells| bagnold(cells, incline, tilt, Contact::NoSlip));
         let observed = (errors[0] / errors[2]).log2() / 2.0;
+        println!("{incline:?} at {tilt}: {errors:?}, order {observed:.2}");
+        println!("{incline:?} at {tilt}: {errors:?}, order {observed:.2}");
         assert!(
             errors[2] < most && observed > order,
             "{incline:?}: {errors:?}, order {observed}"
@@ -345,34 +347,76 @@ fn go_on(collapse: &mut Collapse, until: f64, excess: f64) -> bool {
     false
 }
 
-/// On level ground the deposit is that of a level floor, for which there is other code, to what half as many cells change
-/// (1.3 % of the area): over ground layers on material move with what is below them, and the floor under a single cell
-/// bears the pressure extrapolated from it.
-#[test]
-fn level_ground_is_nearly_a_level_floor() {
-    let mut floor = Collapse::new(
-        &CollapseCase {
-            overhang_degrees: 0.0,
-            aspect: 1.42,
-            height: 1.0,
-            gravity: 1.0,
-            rheology: grains(),
-            cells: 64,
-            length_scaled: 5.0,
-        },
-        &SurfaceOptions::default(),
-    )
-    .unwrap();
+/// A column of aspect ratio 1.42 on a level floor, at t = 4.
+fn on_a_floor(cells: usize) -> Collapse {
+    let case = CollapseCase {
+        overhang_degrees: 0.0,
+        aspect: 1.42,
+        height: 1.0,
+        gravity: 1.0,
+        rheology: grains(),
+        cells,
+        length_scaled: 5.0,
+    };
+    let mut floor = Collapse::new(&case, &SurfaceOptions::default()).unwrap();
     while floor.time() < 4.0 {
         floor.step(4.0).unwrap();
     }
-    let (_, exact) = floor.profile();
-    let mut ground = collapse(64, 5.0, &no_slip(&[[0.0, 0.0], [5.0, 0.0]]));
+    floor
+}
+
+/// The same on level ground that leaves this part of a cell free.
+fn on_level_ground(cells: usize, part: f64) -> Collapse {
+    // A hole where nothing comes sets the grid's lower edge.
+    let hole = -(1.0 - part) * 5.0 / cells as f64;
+    let points = [[0.0, 0.0], [4.8, 0.0], [4.9, hole], [5.0, hole]];
+    let mut ground = collapse(cells, 5.0, &no_slip(&points));
     go_on(&mut ground, 4.0, 1e-9);
-    let (_, depth) = ground.profile();
+    ground
+}
+
+/// L1 distance of two deposits over their area.
+fn miss(exact: &Collapse, collapse: &Collapse) -> f64 {
+    let [(_, exact), (_, depth)] = [exact, collapse].map(Collapse::profile);
     let miss: f64 = exact.iter().zip(&depth).map(|(a, b)| (a - b).abs()).sum();
-    let miss = miss / exact.iter().sum::<f64>();
-    assert!(miss < 0.018, "{miss:e}");
+    miss / exact.iter().sum::<f64>()
+}
+
+/// Root mean square, over columns of a heap 1.2 to 9 cells high, of the second difference of their heights, in cells.
+fn roughness(collapse: &Collapse) -> f64 {
+    let spacing = collapse.spacing();
+    let heights: Vec<f64> = collapse.profile().1.iter().map(|h| h / spacing).collect();
+    let among = heights
+        .windows(3)
+        .filter(|h| (1.2..9.0).contains(&h[1]))
+        .map(|h| (h[0] - 2.0 * h[1] + h[2]).powi(2));
+    let squares: Vec<f64> = among.collect();
+    (squares.iter().sum::<f64>() / squares.len() as f64).sqrt()
+}
+
+/// On level ground the deposit is that of a level floor, for which there is other code: 0.14 % of the area apart; 1.1 % while
+/// layers on material over ground moved with what is below them.
+#[test]
+fn level_ground_is_a_level_floor() {
+    let miss = miss(&on_a_floor(64), &on_level_ground(64, 1.0));
+    println!("deposits differ by {miss:.2e}");
+    assert!(miss < 3e-3, "{miss:e}");
+}
+
+/// Heaps over ground have no steps where their surface passes half a cell: 0.015 and 0.019 of a cell, 0.044 and 0.075 while
+/// layers on material moved with what is below them. Where level ground cuts the cells the deposit is that of the floor to
+/// 0.7 % of the area; 2.8 % while the ground bore the pressure at the corner of a cell instead of the one where it lies.
+#[test]
+fn heaps_over_ground_have_no_steps() {
+    let floor = on_a_floor(128);
+    for (part, most) in [(1.0, 3e-3), (0.63, 0.012)] {
+        let ground = on_level_ground(128, part);
+        let (steps, miss) = (roughness(&ground), miss(&floor, &ground));
+        println!(
+            "{part} of a cell free: second differences {steps:.4}, deposits differ by {miss:.2e}"
+        );
+        assert!(steps < 0.024 && miss < most, "{part} {steps} {miss}");
+    }
 }
 
 /// Down a slope of 0.4 farther than on the level.

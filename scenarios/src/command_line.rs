@@ -95,13 +95,13 @@ enum Command {
         #[arg(long, value_name = "N", value_parser = clap::value_parser!(u16).range(1..=1024))]
         threads: Option<u16>,
     },
-    /// Run a scene with several values of one key: error against cost
+    /// Run a scene with several values of a key, or of several keys together: error against cost
     Pareto {
         #[command(flatten)]
         scene: SceneArguments,
-        /// The key and its values, as in grid.cells=16,32,64
-        #[arg(long, value_name = "KEY=A,B,C")]
-        vary: String,
+        /// A key and its values, as in grid.cells=16,32,64; given for several keys, all combinations are run
+        #[arg(long, value_name = "KEY=A,B,C", required = true)]
+        vary: Vec<String>,
         /// Compare with a run that has this setting, instead of an exact solution
         #[arg(long, value_name = "KEY=VALUE")]
         reference: Vec<String>,

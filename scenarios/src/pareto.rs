@@ -1,6 +1,7 @@
-//! Error against cost: one scene run with several values of one key.
+//! Error against cost: one scene run with several values of a key, or of several keys together.
 
 mod observables;
+mod variants;
 
 use crate::calibrate;
 use crate::cost::{Cost, processor_s};
@@ -14,15 +15,16 @@ use crate::table::Table;
 use observables::{Errors, TOLD, errors};
 use std::path::{Path, PathBuf};
 use std::time::Instant;
+use variants::{Variant, label, parse, variants};
 
-/// A scene, the values of one key, and what to compare with.
+/// A scene, the values of the keys that vary, and what to compare with.
 #[derive(Clone, Debug)]
 pub struct Comparison {
     scene: Scene,
-    /// The key that varies.
-    key: String,
-    /// Its values as written, and the scene with each.
-    variants: Vec<(String, Scene)>,
+    /// The keys that vary.
+    keys: Vec<String>,
+    /// The scene with each combination of their values, the last key's changing first.
+    variants: Vec<Variant>,
     /// The run that counts as right; none where the scene has an exact solution.
     reference: Option<Scene>,
     /// A run that is set beside the others, such as that of another model.
@@ -32,13 +34,13 @@ pub struct Comparison {
 /// One run of a comparison.
 #[derive(Clone, Debug, PartialEq)]
 pub struct Row {
-    /// The key's value as written.
-    pub value: String,
+    /// The values of the keys as written.
+    pub values: Vec<String>,
     /// Relative error; the largest where several observables are compared.
     pub error: f64,
     /// Relative error of each observable, where there are several.
     pub errors: Errors,
-    /// Observed order between this and the run before.
+    /// Observed order between this and the run before, where one key varies.
     pub order: Option<f64>,
     /// Wall time (s).
     pub wall_s: f64,
@@ -59,42 +61,17 @@ struct Ends {
 }
 
 impl Comparison {
-    /// Checks the key, each of its values, the reference and what is set beside.
+    /// Checks the keys, each of their values, the reference and what is set beside.
     pub fn new(
         scene: Scene,
-        vary: &str,
+        vary: &[String],
         reference: &[String],
         beside: &[String],
     ) -> Result<Comparison, Failure> {
-        let malformed = || {
-            Failure::Input(format!(
-                "--vary {vary}: wanted KEY=A,B,C with at least two values, as in `--vary grid.cells=16,32,64`"
-            ))
-        };
-        let (key, values) = vary.split_once('=').ok_or_else(malformed)?;
-        let values: Vec<&str> = values.split(',').map(str::trim).collect();
-        if values.len() < 2 || key.trim().is_empty() || values.iter().any(|v| v.is_empty()) {
-            return Err(malformed());
-        }
-        let key = key.trim().to_owned();
+        let varied = parse(vary)?;
         let scene = of_one_duration(scene)?;
-        let variants = values
-            .iter()
-            .map(|value| {
-                let variant = scene.with(&[format!("{key}={value}")], "--vary")?;
-                Ok(((*value).to_owned(), variant))
-            })
-            .collect::<Result<Vec<_>, SceneError>>()?;
-        for (n, (value, variant)) in variants.iter().enumerate() {
-            let twin = variants[..n].iter().find(|(before, other)| {
-                folder_name(&key, before) == folder_name(&key, value) || other == variant
-            });
-            if let Some((before, _)) = twin {
-                return Err(Failure::Input(format!(
-                    "--vary {key}: the values {before} and {value} are the same run; allowed: each value once"
-                )));
-            }
-        }
+        let variants = variants(&scene, &varied)?;
+        let keys = varied.into_iter().map(|(key, _)| key).collect();
         let with = |sets: &[String], from: &str| match sets {
             [] => Ok(None),
             sets => scene.with(sets, from).map(Some),
@@ -114,7 +91,7 @@ impl Comparison {
         }
         Ok(Comparison {
             scene,
-            key,
+            keys,
             variants,
             reference,
             beside,
@@ -127,7 +104,7 @@ impl Comparison {
         let name = format!("{}-pareto", self.scene.name);
         let place = run_directory::place(out.as_deref(), &name);
         let ends = self.reference.iter().chain(&self.beside);
-        for scene in self.variants.iter().map(|(_, s)| s).chain(ends) {
+        for scene in self.variants.iter().map(|v| &v.scene).chain(ends) {
             run::check(scene)?;
         }
         let directory = RunDirectory::create(&place, &self.scene, "pareto")?;
@@ -162,19 +139,20 @@ impl Comparison {
         summary.cost.wall_s = rows.iter().map(|r| r.wall_s).sum();
         summary.cost.threads = threads.unwrap_or_else(rayon::current_num_threads);
         summary.cost.peak_memory_bytes = crate::cost::peak_memory_bytes();
-        summary
-            .remarks
-            .push(format!("{} against {}", self.key, self.compared_with()));
+        summary.remarks.push(format!(
+            "{} against {}",
+            self.keys.join(", "),
+            self.compared_with()
+        ));
         for row in &rows {
+            let at = label(&self.keys, &row.values);
             if !row.error.is_finite() {
                 summary.remarks.push(format!(
-                    "No error at {} = {}: the run, or what it is compared with, has no value to compare.",
-                    self.key, row.value
+                    "No error at {at}: the run, or what it is compared with, has no value to compare."
                 ));
             }
-            let label = format!("error at {} = {}", self.key, row.value);
             summary.put(
-                &label,
+                &format!("error at {at}"),
                 Quantity::new(row.error, "1").against(0.0, &self.compared_with()),
             );
         }
@@ -207,12 +185,12 @@ impl Comparison {
         }
         if let Some(row) = &beside {
             summary.put(
-                &format!("error at {}", row.value),
+                "error at beside",
                 Quantity::new(row.error, "1").against(0.0, &self.compared_with()),
             );
             end_point.push_str(&format!(
-                "\n{}: error {:.4e}, {:.4} s, {:.2} s of processors, {} steps",
-                row.value, row.error, row.wall_s, row.processor_s, row.steps
+                "\nbeside: error {:.4e}, {:.4} s, {:.2} s of processors, {} steps",
+                row.error, row.wall_s, row.processor_s, row.steps
             ));
         }
         directory.write_summary(&summary)?;
@@ -250,7 +228,7 @@ impl Comparison {
             }
             None => None,
         };
-        let row = |label: &str, value: &str, scene: &Scene| -> Result<Row, Failure> {
+        let row = |label: &str, values: &[String], scene: &Scene| -> Result<Row, Failure> {
             let (path, processor_s) = one(label, scene)?;
             let summary = report::read_summary(&path)?;
             let (error, errors) = match &reference {
@@ -260,7 +238,7 @@ impl Comparison {
             let cost = summary.cost;
             let speed_up = reference.as_ref();
             Ok(Row {
-                value: value.to_owned(),
+                values: values.to_vec(),
                 error,
                 errors: match errors.len() {
                     0 | 1 => Errors::new(),
@@ -274,14 +252,13 @@ impl Comparison {
             })
         };
         let mut rows: Vec<Row> = Vec::new();
-        for (value, scene) in &self.variants {
-            let mut new = row(&folder_name(&self.key, value), value, scene)?;
-            let before = rows.last();
-            new.order = before.and_then(|before| order_between(before, value, new.error));
+        for variant in &self.variants {
+            let mut new = row(&variant.folder, &variant.values, &variant.scene)?;
+            new.order = rows.last().and_then(|before| order_between(before, &new));
             rows.push(new);
         }
         let beside = match &self.beside {
-            Some(scene) => Some(row("beside", "beside", scene)?),
+            Some(scene) => Some(row("beside", &[], scene)?),
             None => None,
         };
         Ok(Ends {
@@ -314,7 +291,8 @@ impl Comparison {
 
     /// Keys of a campaign are compared by campaigns.
     fn of_campaigns(&self) -> bool {
-        matches!(self.scene.body, SceneBody::Incline(_)) && self.key.starts_with("calibration.")
+        matches!(self.scene.body, SceneBody::Incline(_))
+            && self.keys.iter().any(|key| key.starts_with("calibration."))
     }
 
     fn compared_with(&self) -> String {
@@ -329,14 +307,14 @@ impl Comparison {
     }
 
     fn table(&self, rows: &[Row]) -> Table {
-        let mut table = Table::new("pareto")
-            .with(
-                &self.key,
-                "",
-                rows.iter()
-                    .map(|r| r.value.parse().unwrap_or(f64::NAN))
-                    .collect(),
-            )
+        let mut table = Table::new("pareto");
+        for (n, key) in self.keys.iter().enumerate() {
+            let values = rows
+                .iter()
+                .map(|r| number(&r.values[n]).unwrap_or(f64::NAN));
+            table = table.with(key, "", values.collect());
+        }
+        table = table
             .with("error", "1", rows.iter().map(|r| r.error).collect())
             .with(
                 "order",
@@ -349,7 +327,8 @@ impl Comparison {
                 "s",
                 rows.iter().map(|r| r.processor_s).collect(),
             )
-            .with("steps", "1", rows.iter().map(|r| r.steps as f64).collect());
+            .with("steps", "1", rows.iter().map(|r| r.steps as f64).collect())
+            .with("on_front", "1", front(rows));
         if rows.iter().any(|r| r.speed_up.is_some()) {
             let speed_up = rows.iter().map(|r| r.speed_up.unwrap_or(f64::NAN));
             table = table.with("speed_up", "1", speed_up.collect());
@@ -369,7 +348,12 @@ impl Comparison {
     }
 
     fn text(&self, rows: &[Row]) -> String {
-        let width = self.key.len().max(12);
+        let widths: Vec<usize> = self.keys.iter().map(|key| key.len().max(12)).collect();
+        let aligned = |cells: &[String]| {
+            let cells = cells.iter().zip(&widths);
+            let cells: Vec<String> = cells.map(|(c, width)| format!("{c:>width$}")).collect();
+            cells.join("  ")
+        };
         let names: Vec<&str> = rows
             .first()
             .map_or(&[][..], |r| &r.errors)
@@ -377,8 +361,14 @@ impl Comparison {
             .map(|(name, _)| name.as_str())
             .collect();
         let mut text = format!(
-            "{:>width$}  {:>12}  {:>8}  {:>10}  {:>13}  {:>8}  {:>14}",
-            self.key, "error", "order", "wall [s]", "processor [s]", "speed-up", "steps"
+            "{}  {:>12}  {:>8}  {:>10}  {:>13}  {:>8}  {:>14}",
+            aligned(&self.keys),
+            "error",
+            "order",
+            "wall [s]",
+            "processor [s]",
+            "speed-up",
+            "steps"
         );
         for name in &names {
             text.push_str(&format!("  {name:>12}"));
@@ -394,8 +384,8 @@ impl Comparison {
                 }
             };
             text.push_str(&format!(
-                "\n{:>width$}  {:>12}  {:>8}  {:>10.4}  {:>13.2}  {:>8}  {:>14}",
-                row.value,
+                "\n{}  {:>12}  {:>8}  {:>10.4}  {:>13.2}  {:>8}  {:>14}",
+                aligned(&row.values),
                 error(row.error),
                 some(row.order),
                 row.wall_s,
@@ -446,18 +436,6 @@ fn has_exact_solution(scene: &Scene) -> bool {
     matches!(scene.body, SceneBody::Bagnold(_) | SceneBody::Impact(_))
 }
 
-/// A folder name from a setting; characters that file systems dislike become dashes.
-fn folder_name(key: &str, value: &str) -> String {
-    let plain = |c: char| {
-        if c.is_alphanumeric() || "._-+".contains(c) {
-            c
-        } else {
-            '-'
-        }
-    };
-    format!("{key}-{value}").chars().map(plain).collect()
-}
-
 fn exact_error(summary: &Summary) -> f64 {
     let value = |name: &str| summary.results.get(name).and_then(|q| q.value);
     if let Some(error) = value("velocity_error_l2") {
@@ -470,30 +448,68 @@ fn exact_error(summary: &Summary) -> f64 {
     }
 }
 
-/// ln(e_1/e_2)/ln(v_2/v_1): positive where the error falls as the value grows.
-fn order_between(before: &Row, value: &str, error: f64) -> Option<f64> {
-    let (a, b): (f64, f64) = (before.value.parse().ok()?, value.parse().ok()?);
-    let order = (before.error / error).ln() / (b / a).ln();
+/// A value as a number; true and false as 1 and 0.
+fn number(value: &str) -> Option<f64> {
+    match value {
+        "true" => Some(1.0),
+        "false" => Some(0.0),
+        value => value.parse().ok(),
+    }
+}
+
+/// ln(e_1/e_2)/ln(v_2/v_1): positive where the error falls as the value grows; none where several keys vary.
+fn order_between(before: &Row, new: &Row) -> Option<f64> {
+    let ([a], [b]) = (&before.values[..], &new.values[..]) else {
+        return None;
+    };
+    let order = (before.error / new.error).ln() / (number(b)? / number(a)?).ln();
     order.is_finite().then_some(order)
+}
+
+/// 1 for runs of which no other has both a smaller error and a smaller cost, 0 for the others.
+fn front(rows: &[Row]) -> Vec<f64> {
+    let beaten = |row: &Row| {
+        let better = |other: &&Row| other.error < row.error && other.processor_s < row.processor_s;
+        !row.error.is_finite() || rows.iter().any(|other| better(&other))
+    };
+    rows.iter().map(|row| f64::from(!beaten(row))).collect()
 }
 
 #[cfg(test)]
 mod tests {
     use super::*;
 
-    #[test]
-    fn the_order_of_a_halved_error_is_read_off() {
-        let row = Row {
-            value: "16".into(),
-            error: 4e-3,
+    fn row(values: &[&str], error: f64, processor_s: f64) -> Row {
+        Row {
+            values: values.iter().map(|v| (*v).to_owned()).collect(),
+            error,
             errors: Errors::new(),
             order: None,
             wall_s: 1.0,
-            processor_s: 1.0,
+            processor_s,
             speed_up: None,
             steps: 1,
-        };
-        assert!((order_between(&row, "32", 1e-3).unwrap() - 2.0).abs() < 1e-12);
-        assert_eq!(order_between(&row, "fine", 1e-3), None);
+        }
+    }
+
+    #[test]
+    fn the_order_of_a_halved_error_is_read_off() {
+        let coarse = row(&["16"], 4e-3, 1.0);
+        let order = order_between(&coarse, &row(&["32"], 1e-3, 1.0)).unwrap();
+        assert!((order - 2.0).abs() < 1e-12);
+        assert_eq!(order_between(&coarse, &row(&["fine"], 1e-3, 1.0)), None);
+        let two = row(&["32", "2"], 1e-3, 1.0);
+        assert_eq!(order_between(&coarse, &two), None);
+    }
+
+    #[test]
+    fn the_front_leaves_out_what_is_worse_and_dearer() {
+        let rows = [
+            row(&["a"], 0.1, 1.0),
+            row(&["b"], 0.2, 2.0),
+            row(&["c"], 0.05, 3.0),
+            row(&["d"], f64::NAN, 0.5),
+        ];
+        assert_eq!(front(&rows), [1.0, 0.0, 1.0, 0.0]);
     }
 }

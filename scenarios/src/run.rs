@@ -12,6 +12,7 @@ pub mod collapse;
 pub mod collapse_ground;
 mod column_land;
 mod column_of_grains;
+mod column_seen;
 mod comet;
 mod comet_block;
 pub mod continuum_incline;

@@ -113,6 +113,36 @@ fn a_ball_sinks_into_a_joined_bed_as_into_grains() {
     assert!(value(&joint, "grain_steps_share") < 0.4);
 }
 
+/// Boxes that are not about the axis and reach the walls on some sides: in a corner of the container, with three sides, and
+/// from wall to wall, with the bottom alone. The ball goes the way it goes in grains alone.
+#[test]
+fn a_box_may_reach_the_walls() {
+    let folder = tempfile::tempdir().unwrap();
+    succeed(folder.path(), &arguments("grains", &[]));
+    let corner = ["zones.x=[-0.017,0.0125]", "zones.y=[-0.0125,1]"];
+    let level = ["zones.x=[-0.017,0.017]", "zones.y=[-1,1]"];
+    let deep = "zones.depth=0.016";
+    for (name, edges, share) in [("corner", corner, 0.4..0.65), ("level", level, 0.6..0.8)] {
+        let run = arguments(name, &[]).into_iter();
+        let sets = BOWL.iter().filter(|set| !set.contains("half_width"));
+        let sets = sets
+            .chain(&edges)
+            .chain([&deep])
+            .flat_map(|set| ["--set", set]);
+        let run: Vec<&str> = run.chain(sets).collect();
+        succeed(folder.path(), &run);
+        let found = summary(&folder.path().join(name));
+        let way = apart(folder.path(), ["grains", name]);
+        let [steps, books, escaped] =
+            ["grain_steps_share", "ledger_grains", "grains_escaped"].map(|key| value(&found, key));
+        println!(
+            "{name}: ways {way:.4}, grain-steps {steps:.3}, momentum {books:.1e}, escaped {escaped}"
+        );
+        assert!(way < 0.05 && books < 1e-10, "{way} {books}");
+        assert!(share.contains(&steps), "{steps}");
+    }
+}
+
 /// A box that grows.
 const MOVING: [&str; 2] = ["zones.moving=true", "zones.near_diameters=1.5"];
 
@@ -228,6 +258,16 @@ fn bad_joined_beds_are_refused_by_key() {
         (&["zones.half_width=0.009"][..], "zones.half_width", "above"),
         (&["zones.half_width=0.02"], "zones.half_width", "below"),
         (&["zones.depth=0.005"], "zones.depth", "above"),
+        (
+            &["zones.x=[-0.012,0.009]"],
+            "zones.x[1]",
+            "at or beyond 0.0105",
+        ),
+        (
+            &["zones.x=[-0.012,0.012]", "zones.y=[-1,1]"],
+            "zones.half_width",
+            "left out",
+        ),
         (&["zones.budget=100"], "zones.budget", "zones.moving = true"),
         (
             &["zones.moving=true", "zones.wake_speed_scaled=0.0001"],

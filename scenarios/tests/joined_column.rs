@@ -45,19 +45,30 @@ fn a_joined_column_collapses_as_its_grains_do() {
     succeed(folder.path(), &two);
     assert_eq!(hash(&at("joined")), hash(&at("two")));
     succeed(folder.path(), &arguments("control", &none));
+    let forgets = ["overlap.rest_strain=0"];
+    succeed(folder.path(), &arguments("forgets", &forgets));
 
-    let [grains, joined, control] = ["grains", "joined", "control"].map(|name| summary(&at(name)));
-    for name in ["x_front", "runout_scaled", "deposit_height"] {
-        let all = [&grains, &joined, &control].map(|s| value(s, name));
+    let [grains, joined, control, forgets] =
+        ["grains", "joined", "control", "forgets"].map(|name| summary(&at(name)));
+    for name in [
+        "x_front",
+        "x_of_share",
+        "runout_scaled",
+        "deposit_height",
+        "force_of_grains",
+    ] {
+        let all = [&grains, &joined, &control, &forgets].map(|s| value(s, name));
         println!(
-            "{name}: grains {:.4}, joined {:.4}, nothing exchanged {:.4}",
-            all[0], all[1], all[2]
+            "{name}: grains {:.4}, joined {:.4}, nothing exchanged {:.4}, no memory of rest {:.4}",
+            all[0], all[1], all[2], all[3]
         );
     }
     for name in [
         "slip",
         "largest_slip",
         "force_ratio",
+        "force_of_continuum",
+        "rest_ratio",
         "overlap_packing",
         "relaxation_share",
         "grains_escaped",
@@ -91,6 +102,12 @@ fn a_joined_column_collapses_as_its_grains_do() {
     let (joint, without) = (apart("joined"), apart("control"));
     println!("deposits apart: joined {joint:.4}, nothing exchanged {without:.4}");
     assert!(joint < 0.06 && without > 0.08, "{joint} {without}");
+    // What the joint does to the grains that it leaves: they bear what they bear alone.
+    let borne = |found| value(found, "force_of_grains") / value(&grains, "force_of_grains");
+    let forces = [&joined, &control, &forgets].map(borne);
+    println!("forces over those of grains alone: {forces:?}");
+    assert!((forces[0] - 1.0).abs() < 0.15, "{forces:?}");
+    assert!(forces[1] < 0.6 && forces[2] > 1.2, "{forces:?}");
     assert_eq!(value(&joined, "grains_escaped"), 0.0);
     assert!(value(&control, "grains_escaped") > 10.0);
     assert!(value(&joined, "grain_steps_share") < 0.75);

@@ -151,6 +151,8 @@ fn error_against_cost_ends_at_full_grains() {
         "incline",
         "--vary",
         "overlap.height_diameters=8,11",
+        "--vary",
+        "overlap.inner_diameters=3,4",
         "--reference",
         "model=dem",
         "--out",
@@ -166,10 +168,17 @@ fn error_against_cost_ends_at_full_grains() {
     );
     let (header, rows) = table(&folder.path().join("p/pareto.csv"));
     let at = |name: &str| header.iter().position(|h| h == name).unwrap();
-    assert_eq!(rows.len(), 2);
+    // All combinations, the last key's values changing first.
+    assert_eq!(
+        header[..2],
+        ["overlap.height_diameters", "overlap.inner_diameters"]
+    );
+    let values: Vec<&[f64]> = rows.iter().map(|row| &row[..2]).collect();
+    assert_eq!(values, [[8.0, 3.0], [8.0, 4.0], [11.0, 3.0], [11.0, 4.0]]);
+    assert!(rows.iter().any(|row| row[at("on_front")] == 1.0));
     for row in &rows {
         assert!(row[at("error")] > 0.0 && row[at("error")] < 1.0, "{row:?}");
     }
     // More grains, more steps.
-    assert!(rows[1][at("steps")] > rows[0][at("steps")]);
+    assert!(rows[2][at("steps")] > rows[0][at("steps")]);
 }

@@ -138,3 +138,19 @@ fn cliffs_stand_where_their_grains_are_fine_enough() {
     assert_eq!(strong("stood"), 1.0);
     assert!(strong("sunk_standing") < 0.3 && strong("debris_share") > 0.5);
 }
+
+/// What a crack cuts off stands on its foot like a triangle on a corner (Kappel et al. 2020, §3.2): a crack as steep as the
+/// overhang tips it forward, one that leans back farther lets it slide down along the cliff.
+#[test]
+#[ignore = "minutes: run by validate.sh"]
+fn a_crack_that_leans_back_farther_than_the_overhang_tips_nothing_forward() {
+    let folder = tempfile::tempdir().unwrap();
+    let [as_steep, flatter] = [("steep", "crack.degrees=10"), ("flat", "crack.degrees=20")]
+        .map(|(name, crack)| cliff(folder.path(), name, &[crack]));
+    for found in [&as_steep, &flatter] {
+        assert_eq!(found("stood"), 1.0);
+        assert!(found("time_of_failure") < 600.0 && found("time_of_rest") < 3600.0);
+    }
+    let [forward, back] = [&as_steep, &flatter].map(|found| found("forward_turn"));
+    assert!(forward > 30.0 && back < 10.0, "{forward} {back}");
+}

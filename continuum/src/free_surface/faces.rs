@@ -4,7 +4,7 @@
 //! face of an active cell carries an unknown velocity. What lies in less filled cells above them
 //! *follows*: such a face moves with the nearest unknown towards the material and adds its mass to
 //! it, so mass and momentum of a step are complete. Material that nothing active touches is
-//! *loose*: it flies. In the plane a layer less than half a cell deep on material that fills its cells slides on it
+//! *loose*: it flies. A layer less than half a cell deep on material that fills its cells slides on it
 //! with a velocity of its own ([`super::layers_on_material`]).
 
 use super::operators::EMPTY;
@@ -155,8 +155,8 @@ impl<const D: usize> Faces<D> {
             if lies_on_wall(topology, fractions, component, face) {
                 return Face::Still;
             }
-            let base = self.material_under(topology, component, face);
-            if base != NONE && mass > THINNEST_SLIDING {
+            let base = self.material_under(topology, fractions, component, face);
+            if base != NONE {
                 return self.take(component, face, false, base);
             }
             let on_wall = self.wall_under(grid, topology, component, face).is_some();
@@ -184,12 +184,21 @@ impl<const D: usize> Faces<D> {
         Face::Own(self.own.len() - 1)
     }
 
-    /// The face below one along the last axis, if it lies between active cells and gravity points to it rather than
-    /// along it; in the plane only.
-    fn material_under(&self, topology: &Topology<D>, component: usize, face: usize) -> usize {
+    /// The face below one along the last axis, if a layer slides on it: it lies between active cells, gravity points to it
+    /// rather than along it, and the layer is not too thin.
+    pub(super) fn material_under(
+        &self,
+        topology: &Topology<D>,
+        fractions: &[f64],
+        component: usize,
+        face: usize,
+    ) -> usize {
         let last = D - 1;
         let along = self.acceleration[component].abs();
-        if D > 2 || component == last || weight_onto(&self.acceleration, last, 0) <= along {
+        if component == last
+            || weight_onto(&self.acceleration, last, 0) <= along
+            || topology.face_mean(component, face, fractions) <= THINNEST_SLIDING
+        {
             return NONE;
         }
         let base = topology.face_neighbours[component][face][last][0];

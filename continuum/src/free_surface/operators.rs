@@ -79,7 +79,9 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             ..Parts::default()
         };
         self.add_pressure_forces(&mut parts);
-        self.add_pressure_on_layers(&mut parts);
+        let mass = std::mem::take(&mut parts.mass);
+        self.add_pressure_on_layers(&mass, &mut parts);
+        parts.mass = mass;
         self.add_thin_layers(&mut parts);
         let mut places = Vec::new();
         for (cell, &fraction) in self.fractions.iter().enumerate() {
@@ -260,7 +262,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             if (0..D).any(|axis| self.slides(axis, at)) {
                 self.add_sliding(cell, index, side, [filled(), share], points, places);
             }
-            let layer = self.under_layer(cell, at, share, filled);
+            let layer = self.under_layer(cell, side, share, filled);
             let volume = match (&layer, self.wall_share(at)) {
                 (Some(layer), _) => layer.volume,
                 (None, Some(factor)) => factor * share,
@@ -271,10 +273,9 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             }
             let mut point = QuadraturePoint::new(volume * self.grid.cell_volume());
             let part = self.part_beside_wall(at);
-            let stretched = layer.as_ref().map_or(part, |layer| part * layer.stretched);
             for axis in 0..D {
                 for &(row, orientation) in stretching::<D>(axis) {
-                    self.add_stretching(cell, axis, row, stretched * orientation, &mut point);
+                    self.add_stretching(cell, axis, row, part * orientation, &mut point);
                 }
             }
             if !self.add_shear_at_edge(at, &mut point) {
@@ -304,7 +305,10 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 }
             }
             match &layer {
-                Some(layer) => point.pressure_offset += layer.pressure,
+                Some(layer) => {
+                    layer.scale(&mut point);
+                    point.pressure_offset += layer.pressure;
+                }
                 None => self.add_corner_pressure(at, &mut point),
             }
             if !point.velocities().is_empty() {
@@ -547,14 +551,14 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         }
     }
 
-    /// The weight of a layer in which one cell has a pressure, on a floor of the plane to which it sticks. Where a flow that
+    /// The weight of a layer in which one cell has a pressure, on a floor to which it sticks. Where a flow that
     /// comes to rest is pressed together the pressure in that cell bears the stress across, up to μ p, and exceeds the
     /// weight; along the floor nothing stretches and the pressure is the weight. Extrapolated from the cell it held
     /// the front back, by an error in proportion to the cell.
     fn weight_of_one_cell(&self, cell: usize, axis: usize, corner: [usize; D]) -> Option<f64> {
         let weight = weight_onto(&self.acceleration, axis, 0);
         let above = self.topology.cell_neighbours[cell][axis][1];
-        let is_one = D == 2
+        let is_one = axis == D - 1
             && corner[axis] == 0
             && weight > 0.0
             && self.sticks(axis, corner)

@@ -10,9 +10,17 @@
 //! ```
 //! for each horizontal h, with the shear strain γ of the place since then, γ_c that which wipes the memory out, and σ_zz the
 //! continuum's. Grains' stresses reach the continuum less the same term, so that both sides speak of differences from one state
-//! of rest. An edge in a column that has lost its gate is another matter: what lies behind it yields at once, its stress is
-//! what its motion makes it, and a memory would count that twice (σ_xx of grains over continuum 1.15 for 0.94). Under a level bed the term depends on the height alone, is a gradient of nothing along the horizontal and
+//! of rest. Under a level bed the term depends on the height alone, is a gradient of nothing along the horizontal and
 //! moves nothing.
+//!
+//! Behind the edge of a column that has lost its gate the continuum comes close to yield, where its own stress has unloaded already.
+//! What it remembers must not count that twice: no material without cohesion bears less sideways than when it yields actively
+//! (Rankine), so the memory takes no stress below
+//!
+//! ```text
+//! σ_hh = K_a σ_zz,      K_a = (1 − μ_s)/(1 + μ_s)
+//! ```
+//! which is that of the coaxial law in the plane, whose sin φ is μ_s.
 
 use colluvium_continuum::rheology::strain_rate_norm;
 use colluvium_continuum::strain::SPACE_COMPONENTS;
@@ -26,6 +34,8 @@ pub struct RestStress {
     pub strain: Vec<[f64; SPACE_COMPONENTS]>,
     /// Strain γ_c that wipes it out; without one nothing is remembered.
     pub scale: f64,
+    /// K_a, below which the memory takes no stress; 0 where it may take any.
+    pub active: f64,
 }
 
 impl RestStress {
@@ -35,6 +45,7 @@ impl RestStress {
             ratio: 1.0,
             strain: vec![[0.0; SPACE_COMPONENTS]; cells],
             scale,
+            active: 0.0,
         }
     }
 
@@ -44,6 +55,18 @@ impl RestStress {
         if ratio.is_finite() && ratio > 0.0 {
             self.ratio = ratio;
         }
+    }
+
+    /// Horizontal stress of a cell's grains for that of its continuum and the vertical one (Pa, positive in tension).
+    pub fn of_grains(&self, cell: usize, horizontal: f64, vertical: f64) -> f64 {
+        let remembered = horizontal + self.beyond(cell, vertical);
+        // Both are negative in compression.
+        remembered.min(horizontal.max(self.active * vertical))
+    }
+
+    /// Horizontal stress of a cell's continuum for that of its grains and the vertical one (Pa, positive in tension).
+    pub fn of_continuum(&self, cell: usize, horizontal: f64, vertical: f64) -> f64 {
+        horizontal - self.beyond(cell, vertical)
     }
 
     /// What comes to a cell's horizontal stress for its vertical one (Pa, positive in tension).
@@ -73,5 +96,30 @@ mod tests {
         assert_eq!(rest.ratio, 0.6);
         rest.scale = 0.0;
         assert_eq!(rest.beyond(0, -100.0), 0.0);
+    }
+
+    #[test]
+    fn no_memory_takes_stress_below_that_of_yield() {
+        let mut rest = RestStress::nothing(1, 0.01);
+        rest.active = 0.3;
+        let horizontals = [-100.0, -60.0, -20.0];
+        let same = horizontals.map(|xx| rest.of_grains(0, xx, -100.0));
+        assert_eq!(same, horizontals);
+        rest.measure(-60.0, -100.0);
+        let close = |a: f64, b: f64| assert!((a - b).abs() < 1e-12, "{a} {b}");
+        // Level bed; near yield; the continuum itself beyond it.
+        for (xx, expected) in [
+            (-100.0, -60.0),
+            (-90.0, -50.0),
+            (-60.0, -30.0),
+            (-20.0, -20.0),
+        ] {
+            close(rest.of_grains(0, xx, -100.0), expected);
+        }
+        // Both ways, while nothing yields.
+        close(rest.of_continuum(0, -50.0, -100.0), -90.0);
+        // With no bound it would count the unloading twice.
+        rest.active = 0.0;
+        close(rest.of_grains(0, -45.0, -100.0), -5.0);
     }
 }

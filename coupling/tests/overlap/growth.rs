@@ -139,7 +139,7 @@ pub(super) fn spec(simulation: &mut Simulation, travel: Travel, misplaced: f64) 
         gravity: 1.0,
         law: MuI::new(0.36, 0.70, 0.3, 1.0, solid, DENSITY),
         options: SurfaceOptions::default(),
-        half: [7.0, 0.5 * SIZE[1]],
+        edges: [[0.5 * SIZE[0] - 7.0, 0.5 * SIZE[0] + 7.0], [0.0, SIZE[1]]],
         bottom: 0.0,
         settings: settings.resolve(&scales, false).unwrap(),
         ball: None,

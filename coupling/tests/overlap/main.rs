@@ -17,4 +17,5 @@ mod pulse;
 mod rest;
 mod rest_pressure;
 mod sheared;
+mod witness;
 mod world;

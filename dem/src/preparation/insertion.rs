@@ -73,6 +73,39 @@ impl fmt::Display for InsertionReport {
     }
 }
 
+/// So many grains, none touching another, in a periodic cube of which cubes around grains of the largest mean size would take
+/// the part `solid`.
+///
+/// # Errors
+/// If a number is out of its range or a grain finds no room.
+pub(super) fn insert_in_cube(
+    ingredients: &[Ingredient],
+    grains: usize,
+    seed: u64,
+    solid: f64,
+) -> Result<(Domain, Vec<Grain>, InsertionReport), SetupError> {
+    let means = ingredients.iter().map(|i| i.sizes.mean());
+    let radius = means.fold(0.0, f64::max);
+    let edge = (grains as f64 * 8.0 * radius.powi(3) / solid).cbrt();
+    let domain = Domain {
+        lower: Vector3::zeros(),
+        upper: Vector3::repeat(edge),
+        periodic: [true; 3],
+    };
+    let insertion = Insertion {
+        region: Region::Everywhere,
+        domain,
+        ingredients: ingredients.to_vec(),
+        amount: Amount::Grains(grains),
+        gap: 0.0,
+        velocity: Vector3::zeros(),
+        tries: TRIES,
+        seed,
+    };
+    let (grains, report) = insert_loose(&insertion, &[])?;
+    Ok((domain, grains, report))
+}
+
 /// Inserts grains that touch neither each other nor any of `among`; the largest come first.
 ///
 /// # Errors

@@ -11,16 +11,14 @@
 //! part: only the geometry is handed back.
 
 use super::coordination::{Coordination, HELD_FRICTIONLESS};
-use super::ingredients::{Amount, Ingredient};
-use super::insertion::{Insertion, TRIES, insert_loose};
+use super::ingredients::Ingredient;
+use super::insertion::insert_in_cube;
 use super::packing::Packing;
 use super::relaxation::{Watch, time_unit};
 use super::rest::RestMeasures;
 use super::size_report::SizeReport;
 use crate::contact::{ContactLaw, Hooke, Tangential, TangentialSpring};
-use crate::domain::Domain;
 use crate::grains::Grain;
-use crate::region::Region;
 use crate::setup::{Setup, SetupError, Threads, check};
 use crate::simulation::Simulation;
 use crate::snapshot::Snapshot;
@@ -140,32 +138,17 @@ struct Rested {
     measures: RestMeasures,
 }
 
+/// Volume of the cubes around grains of the largest mean size, over that of the box, that any mixture of the ingredients can begin with.
+const LOOSE: f64 = 0.3;
+
 impl Jamming {
     /// A loose cloud in a cube.
     fn cloud(&self) -> Result<(Packing, Vec<SizeReport>), SetupError> {
         check("jamming.grains", self.grains as f64, "≥ 64", |n| {
             n >= 64.0
         })?;
-        let mean = |i: &Ingredient| i.sizes.mean();
-        let radius = self.ingredients.iter().map(mean).fold(0.0, f64::max);
-        // Loose enough for any mixture of the ingredients.
-        let edge = (self.grains as f64 * 8.0 * radius.powi(3) / 0.3).cbrt();
-        let domain = Domain {
-            lower: Vector3::zeros(),
-            upper: Vector3::repeat(edge),
-            periodic: [true; 3],
-        };
-        let insertion = Insertion {
-            region: Region::Everywhere,
-            domain,
-            ingredients: self.ingredients.clone(),
-            amount: Amount::Grains(self.grains),
-            gap: 0.0,
-            velocity: Vector3::zeros(),
-            tries: TRIES,
-            seed: self.seed,
-        };
-        let (grains, report) = insert_loose(&insertion, &[])?;
+        let (domain, grains, report) =
+            insert_in_cube(&self.ingredients, self.grains, self.seed, LOOSE)?;
         let packing = Packing {
             domain,
             grains,

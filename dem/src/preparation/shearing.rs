@@ -8,15 +8,13 @@
 //! two stretches with its grains carried: shear stands still for a fiftieth of unit strain after each twentieth, its profile kept. A cell
 //! whose mean pressure is more than twice or less than half of what was asked for is refused. What comes out is [`ShearedCell`], with the means over the last part of the strain.
 
-use super::ingredients::{Amount, Ingredient};
-use super::insertion::{Insertion, TRIES, insert_loose};
+use super::ingredients::Ingredient;
+use super::insertion::insert_in_cube;
 use super::relaxation::Watch;
 use super::sheared_cell::ShearedCell;
 use crate::boundaries::{BoxMotion, Edge};
 use crate::contact::Laws;
-use crate::domain::Domain;
 use crate::grains::Grain;
-use crate::region::Region;
 use crate::setup::{Setup, SetupError, Threads, check};
 use crate::simulation::Simulation;
 use nalgebra::{Matrix3, Vector3};
@@ -116,25 +114,9 @@ impl Shearing {
 
     /// A loose cloud in a periodic cube.
     fn cloud(&self) -> Result<Simulation, SetupError> {
-        let mean = |i: &Ingredient| i.sizes.mean();
-        let radius = self.ingredients.iter().map(mean).fold(0.0, f64::max);
-        let edge = (self.grains as f64 * 8.0 * radius.powi(3) / CLOUD).cbrt();
-        let mut domain = Domain {
-            lower: Vector3::zeros(),
-            upper: Vector3::repeat(edge),
-            periodic: [true; 3],
-        };
-        let cloud = Insertion {
-            region: Region::Everywhere,
-            domain,
-            ingredients: self.ingredients.clone(),
-            amount: Amount::Grains(self.grains),
-            gap: 0.0,
-            velocity: Vector3::zeros(),
-            tries: TRIES,
-            seed: self.seed,
-        };
-        let (mut grains, _) = insert_loose(&cloud, &[])?;
+        let (mut domain, mut grains, _) =
+            insert_in_cube(&self.ingredients, self.grains, self.seed, CLOUD)?;
+        let edge = domain.lengths().x;
         // Grains of one size less than the mean leave room: the box is the smallest that is loose.
         let solid: f64 = grains.iter().map(Grain::volume).sum();
         let factor = (solid / CLOUD).cbrt() / edge;
@@ -254,6 +236,7 @@ fn resize(simulation: &mut Simulation, volume: f64, steps: u64) -> Result<(), Se
 mod tests {
     use super::*;
     use crate::contact::{ContactLaw, Hooke, TangentialSpring};
+    use crate::domain::Domain;
     use crate::preparation::RadiusLaw;
     use crate::snapshot::{Partner, Snapshot};
     use nalgebra::Rotation3;

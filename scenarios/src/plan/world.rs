@@ -34,7 +34,7 @@ pub fn plan(scene: &Scene, recipe: &dyn Recipe) -> Result<String, Failure> {
         expected.preparation = Some(0.0);
     }
     say_grains(&mut lines, &materials, expected.grains);
-    let factor = recipe.coarse_graining();
+    let factor = recipe.keys().coarse_graining;
     if factor > 1.0 {
         lines.say(
             "parcels",
@@ -52,7 +52,7 @@ pub fn plan(scene: &Scene, recipe: &dyn Recipe) -> Result<String, Failure> {
     }
     lines.say("left out", &left_out(recipe, &stand).join(", "));
     let (taken, choice) = (stand.setup.timestep, &stand.choice);
-    let words = match recipe.step().seconds {
+    let words = match recipe.keys().step.seconds {
         Some(_) => step::given(taken, choice),
         None => step::chosen(choice),
     };
@@ -288,13 +288,13 @@ fn wall_in_words(wall: &Wall) -> String {
 }
 
 fn say_start(lines: &mut Lines, recipe: &dyn Recipe, stored: bool) {
-    let text = match (recipe.packing(), stored) {
+    let text = match (recipe.keys().packing, stored) {
         (Some(named), true) => format!("from the stored packing {}", store::place(named).display()),
         (Some(named), false) => format!(
             "prepared, and kept as {} for other scenes",
             store::place(named).display()
         ),
-        (None, _) => format!("prepared from the seed {}", recipe.seed()),
+        (None, _) => format!("prepared from the seed {}", recipe.keys().seed),
     };
     lines.say("start", &text);
 }

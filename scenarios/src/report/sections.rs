@@ -38,6 +38,46 @@ pub fn plots(record: &Record) -> Markup {
     }
 }
 
+/// The error against one of the keys that vary, a line for each combination of the others.
+fn by_key(table: &Table, keys: &[&str], key: &str) -> Plot {
+    let others: Vec<&str> = keys.iter().copied().filter(|other| *other != key).collect();
+    let mut lines: Vec<(Vec<f64>, Vec<(f64, f64)>)> = Vec::new();
+    let pairs = table.column(key).iter().zip(table.column("error"));
+    for (row, (x, error)) in pairs.enumerate() {
+        let at: Vec<f64> = others.iter().map(|k| table.column(k)[row]).collect();
+        match lines.iter_mut().find(|(of, _)| *of == at) {
+            Some((_, line)) => line.push((*x, *error)),
+            None => lines.push((at, vec![(*x, *error)])),
+        }
+    }
+    let mut plot = Plot::new(key, "relative error");
+    for (n, (at, line)) in lines.iter().enumerate() {
+        let words = others.iter().zip(at).map(|(k, v)| format!("{k} = {v}"));
+        let label = match others.len() {
+            0 => "runs".to_owned(),
+            _ => words.collect::<Vec<_>>().join(", "),
+        };
+        plot = plot.with("", Mark::Line, n + 1, line.clone()).with(
+            &label,
+            Mark::Dots,
+            n + 1,
+            line.clone(),
+        );
+    }
+    let points = table.pairs(key, "error");
+    // A guide for keys that refine; others, such as a time step, coarsen as they grow.
+    let refines = table.column("order").iter().any(|order| *order > 0.0);
+    if let Some((x, y)) = points.first().copied().filter(|p| p.0 > 0.0 && refines) {
+        let slope = points
+            .iter()
+            .map(|p| (p.0, y * (x / p.0).powi(2)))
+            .collect();
+        plot = plot.with("second order", Mark::Dashes, 6, slope);
+    }
+    (plot.x_log, plot.y_log) = (true, true);
+    plot
+}
+
 fn pareto(table: &Table, ends: Option<&Table>) -> Markup {
     // Runs of before processor time was told have wall time alone.
     let (cost, label) = match table.column("processor_s") {
@@ -45,8 +85,21 @@ fn pareto(table: &Table, ends: Option<&Table>) -> Markup {
         _ => ("processor_s", "processor time [s]"),
     };
     let points = table.pairs(cost, "error");
+    let keys = table.columns.iter().take_while(|c| c.name != "error");
+    let keys: Vec<&str> = keys.map(|c| c.name.as_str()).collect();
+    // Runs of one key stand in a row; of several, those that nothing beats.
+    let line = match keys.len() {
+        0 | 1 => points.clone(),
+        _ => {
+            let best = points.iter().zip(table.column("on_front"));
+            let best = best.filter(|(_, on)| **on > 0.0).map(|(p, _)| *p);
+            let mut best: Vec<(f64, f64)> = best.collect();
+            best.sort_by(|a, b| a.0.total_cmp(&b.0));
+            best
+        }
+    };
     let mut plot = Plot::new(label, "relative error")
-        .with("", Mark::Line, 0, points.clone())
+        .with("", Mark::Line, 0, line)
         .with("runs", Mark::Dots, 0, points.clone());
     for (seconds, error) in ends.map(|t| t.pairs(cost, "error")).unwrap_or_default() {
         plot = match error > 0.0 {
@@ -64,30 +117,18 @@ fn pareto(table: &Table, ends: Option<&Table>) -> Markup {
         .columns
         .iter()
         .filter(|c| c.name.starts_with("error_"));
-    for (n, part) in parts.enumerate() {
+    for (n, part) in parts.enumerate().filter(|_| keys.len() < 2) {
         let label = part.name.trim_start_matches("error_").replace('_', " ");
         plot = plot.with(&label, Mark::Dashes, n + 2, table.pairs(cost, &part.name));
     }
-    let key = table.columns.first().map_or("", |c| c.name.as_str());
-    let mut by_key = Plot::new(key, "relative error")
-        .with("", Mark::Line, 1, table.pairs(key, "error"))
-        .with("runs", Mark::Dots, 1, table.pairs(key, "error"));
-    let points = table.pairs(key, "error");
-    // A guide for keys that refine; others, such as a time step, coarsen as they grow.
-    let refines = table.column("order").iter().any(|order| *order > 0.0);
-    if let Some((x, y)) = points.first().copied().filter(|p| p.0 > 0.0 && refines) {
-        let slope = points
-            .iter()
-            .map(|p| (p.0, y * (x / p.0).powi(2)))
-            .collect();
-        by_key = by_key.with("second order", Mark::Dashes, 6, slope);
-    }
-    (by_key.x_log, by_key.y_log) = (true, true);
+    let by_key: Vec<Plot> = keys.iter().map(|key| by_key(table, &keys, key)).collect();
     html! {
         h2 { "Error against cost" }
         div.figures {
             (figure(&plot.svg(WIDTH, HEIGHT), "Each point is one run; down and left is better."))
-            (figure(&by_key.svg(WIDTH, HEIGHT), "The error against the key that was varied."))
+            @for plot in by_key {
+                (figure(&plot.svg(WIDTH, HEIGHT), "The error against a key that was varied."))
+            }
         }
         div.wide {
             table {

@@ -12,10 +12,10 @@
 //! last step of the search.
 
 use super::world::workshop::{Surroundings, step_for};
-use super::world::{Course, Expected, Ran, Recipe, Workshop, World};
+use super::world::{Course, Expected, Ran, Recipe, RecipeKeys, Workshop, World};
 use crate::failure::Failure;
-use crate::scene::world::{Materials, OutputKeys, StepKeys};
-use crate::scene::{AngleOfReposeScene, LawKeys, layers};
+use crate::scene::world::Materials;
+use crate::scene::{AngleOfReposeScene, layers};
 use crate::summary::{Figure, Quantity, Summary};
 use crate::table::Table;
 use colluvium_dem::preparation::{InclineBed, Packing, settle_incline_bed};
@@ -201,28 +201,15 @@ impl Recipe for AngleOfReposeScene {
         Ok(AngleOfReposeScene::materials(self, origin)?)
     }
 
-    fn contact(&self) -> &LawKeys {
-        &self.contact
-    }
-
-    fn seed(&self) -> u64 {
-        self.seed
-    }
-
-    fn coarse_graining(&self) -> f64 {
-        1.0
-    }
-
-    fn step(&self) -> &StepKeys {
-        &self.timestep
-    }
-
-    fn output(&self) -> &OutputKeys {
-        &self.output
-    }
-
-    fn packing(&self) -> Option<&str> {
-        self.packing.as_deref()
+    fn keys(&self) -> RecipeKeys<'_> {
+        RecipeKeys {
+            contact: &self.contact,
+            seed: self.seed,
+            coarse_graining: 1.0,
+            step: &self.timestep,
+            output: &self.output,
+            packing: self.packing.as_deref(),
+        }
     }
 
     fn provenance(&self) -> Option<toml::Table> {

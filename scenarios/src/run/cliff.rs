@@ -19,10 +19,10 @@ use super::comet_block::CometBlock;
 use super::land::Land;
 use super::world::boulders::boulders;
 use super::world::workshop::Surroundings;
-use super::world::{Course, Expected, Ran, Recipe, Workshop, World, fragments};
+use super::world::{Course, Expected, Ran, Recipe, RecipeKeys, Workshop, World, fragments};
 use crate::failure::Failure;
-use crate::scene::world::{Materials, OutputKeys, Place, StepKeys};
-use crate::scene::{CliffScene, LawKeys, layers};
+use crate::scene::world::{Materials, Place};
+use crate::scene::{CliffScene, layers};
 use crate::summary::{Figure, Summary};
 use crate::table::Table;
 use colluvium_dem::preparation::{Packing, Relaxation, Rest};
@@ -97,28 +97,15 @@ impl Recipe for CliffScene {
         Ok(CliffScene::materials(self, origin)?)
     }
 
-    fn contact(&self) -> &LawKeys {
-        &self.contact
-    }
-
-    fn seed(&self) -> u64 {
-        self.seed
-    }
-
-    fn coarse_graining(&self) -> f64 {
-        self.coarse_graining
-    }
-
-    fn step(&self) -> &StepKeys {
-        &self.timestep
-    }
-
-    fn output(&self) -> &OutputKeys {
-        &self.output
-    }
-
-    fn packing(&self) -> Option<&str> {
-        self.packing.as_deref()
+    fn keys(&self) -> RecipeKeys<'_> {
+        RecipeKeys {
+            contact: &self.contact,
+            seed: self.seed,
+            coarse_graining: self.coarse_graining,
+            step: &self.timestep,
+            output: &self.output,
+            packing: self.packing.as_deref(),
+        }
     }
 
     fn provenance(&self) -> Option<toml::Table> {

@@ -3,13 +3,14 @@
 //! Grains fall into the gap between that wall and a gate, settle and are cut level. The run begins when the
 //! gate has gone. Fronts and profiles are taken as those of the continuum (`heap.rs`).
 
-use super::heap::{HeapAxis, HeapCourse, edge};
+use super::column_seen::SeenColumn;
+use super::heap::{HeapAxis, HeapCourse, edge, place_of_share};
 use super::land::Land;
 use super::world::workshop::{Surroundings, softened, step_for};
-use super::world::{Course, Expected, Ran, Recipe, Workshop, World, fragments};
+use super::world::{Course, Expected, Ran, Recipe, RecipeKeys, Workshop, World, fragments};
 use crate::failure::Failure;
-use crate::scene::world::{Materials, OutputKeys, Place, StepKeys};
-use crate::scene::{CollapseScene, ColumnFloorKind, DENSE, LawKeys, layers};
+use crate::scene::world::{Materials, Place};
+use crate::scene::{CollapseScene, ColumnFloorKind, DENSE, layers};
 use crate::summary::{Quantity, Summary};
 use crate::table::Table;
 use colluvium_dem::preparation::{Amount, Packing, Relaxation, Rest, solid_fraction};
@@ -41,6 +42,10 @@ pub(super) const STILL: f64 = 1e-4;
 pub(super) const STILL_LOOKS: f64 = 3.0;
 /// Times √(H/g) before which a column that has just been let go is not looked at for rest.
 pub(super) const BEGUN: f64 = 1.0;
+
+/// Share of a heap's area up to which `x_of_share` reaches, in words.
+pub(super) const FRONT_SHARE: f64 = 0.99;
+pub(super) const OF_SHARE: &str = "up to which 99 % of the heap's area lies: a front that hangs on no single grain; error from both halves of the slab";
 
 /// Kinetic energy of a ball, translation and rotation (J).
 pub(super) fn kinetic(g: &Grain) -> f64 {
@@ -221,28 +226,15 @@ impl Recipe for CollapseScene {
         Ok(self.grain_materials(origin)?)
     }
 
-    fn contact(&self) -> &LawKeys {
-        &self.contact
-    }
-
-    fn seed(&self) -> u64 {
-        self.grains.seed
-    }
-
-    fn coarse_graining(&self) -> f64 {
-        1.0
-    }
-
-    fn step(&self) -> &StepKeys {
-        &self.timestep
-    }
-
-    fn output(&self) -> &OutputKeys {
-        &self.output
-    }
-
-    fn packing(&self) -> Option<&str> {
-        self.grains.packing.as_deref()
+    fn keys(&self) -> RecipeKeys<'_> {
+        RecipeKeys {
+            contact: &self.contact,
+            seed: self.grains.seed,
+            coarse_graining: 1.0,
+            step: &self.timestep,
+            output: &self.output,
+            packing: self.grains.packing.as_deref(),
+        }
     }
 
     fn provenance(&self) -> Option<toml::Table> {
@@ -393,25 +385,24 @@ impl Recipe for CollapseScene {
 
     fn steer(&self, simulation: &mut Simulation, state: &mut Vec<f64>) -> Result<Course, Failure> {
         let columns = self.heap_axis().columns;
-        let mut course = match HeapCourse::read(state, columns) {
-            Some(course) => course,
-            None => HeapCourse {
-                solid_fraction: solid_fraction(
-                    &simulation.grain_list(),
-                    simulation.domain(),
-                    &self.middle(),
-                ),
-                ..HeapCourse::default()
-            },
+        let mut seen = match SeenColumn::read(state, columns) {
+            Some(seen) => seen,
+            None => {
+                let grains = simulation.grain_list();
+                let solid = solid_fraction(&grains, simulation.domain(), &self.middle());
+                SeenColumn::of_packing(solid)
+            }
         };
+        seen.through_joint(self, simulation)?;
+        let course = &mut seen.course;
         let profile = course.fronts.len().is_multiple_of(PROFILE_EVERY);
-        self.see(simulation, &mut course, profile);
+        self.see(simulation, course, profile);
         let unit = simulation.free_mass() * self.gravity * self.grains.diameter;
         let still = simulation.time() > BEGUN * self.time_unit()
             && self.kinetic_of_the_heap(simulation) < STILL * unit;
         course.resting = if still { course.resting + 1.0 } else { 0.0 };
         let over = course.resting >= STILL_LOOKS;
-        course.write(state);
+        seen.write(state);
         Ok(if over { Course::Over } else { Course::On })
     }
 
@@ -420,15 +411,16 @@ impl Recipe for CollapseScene {
     }
 
     fn look(&self, _: &mut Simulation, _: &Snapshot, state: &[f64]) -> Vec<f64> {
-        let course = HeapCourse::read(state, self.heap_axis().columns);
-        let last = course.and_then(|c| c.fronts.last().copied());
+        let seen = SeenColumn::read(state, self.heap_axis().columns);
+        let last = seen.and_then(|s| s.course.fronts.last().copied());
         last.map_or(vec![f64::NAN; 2], |[_, front, height]| vec![front, height])
     }
 
     fn conclude(&self, ran: &mut Ran, summary: &mut Summary) -> Result<Vec<Table>, Failure> {
         let axis = self.heap_axis();
         let places = axis.positions();
-        let mut course = HeapCourse::read(&ran.state, axis.columns).unwrap_or_default();
+        let seen = SeenColumn::read(&ran.state, axis.columns).unwrap_or_default();
+        let (force, mut course) = (seen.force(), seen.course);
         if course
             .fronts
             .last()
@@ -444,9 +436,13 @@ impl Recipe for CollapseScene {
         let half = |upper: bool| {
             let across = |g: &Grain| g.position.y.rem_euclid(self.slab()) > 0.5 * self.slab();
             let heights = self.heights(&grains, 0.5 * base, |g| across(g) == upper);
-            edge(&places, &heights, self.threshold())
+            [
+                edge(&places, &heights, self.threshold()),
+                place_of_share(&places, &heights, FRONT_SHARE),
+            ]
         };
-        let error = 0.5 * (half(true) - half(false)).abs();
+        let [upper, lower] = [half(true), half(false)];
+        let [error, error_of_share] = [0, 1].map(|k| 0.5 * (upper[k] - lower[k]).abs());
         let width = self.width();
         let mut put = |name: &str, quantity: Quantity, source: &str| {
             summary.put(name, quantity.from(source));
@@ -463,6 +459,18 @@ impl Recipe for CollapseScene {
             one((front - width) / width).with_error(error / width),
             "(x_front − width)/width",
         );
+        put(
+            "x_of_share",
+            m(place_of_share(&places, &deposit, FRONT_SHARE)).with_error(error_of_share),
+            OF_SHARE,
+        );
+        if let Some(force) = force {
+            put(
+                "force_of_grains",
+                Quantity::new(force, "N"),
+                "along x through the surface that would be a joined column's handshake surface, of contacts and velocity fluctuations, mean in time",
+            );
+        }
         let highest = deposit.iter().copied().fold(0.0, f64::max);
         put("deposit_height", m(highest), "greatest height at the end");
         let rests = course.resting >= STILL_LOOKS;

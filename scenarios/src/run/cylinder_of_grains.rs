@@ -15,10 +15,10 @@ mod beside;
 use super::column_of_grains::{BEGUN, FLOOR, FRONTS, PROFILE_EVERY, STILL, STILL_LOOKS, kinetic};
 use super::heap::{HeapAxis, HeapCourse, edge};
 use super::world::workshop::{Surroundings, softened};
-use super::world::{Course, Expected, Ran, Recipe, Workshop, World};
+use super::world::{Course, Expected, Ran, Recipe, RecipeKeys, Workshop, World};
 use crate::failure::Failure;
-use crate::scene::world::{Materials, OutputKeys, Place, StepKeys};
-use crate::scene::{DENSE, GrainCylinderScene, LawKeys, layers};
+use crate::scene::world::{Materials, Place};
+use crate::scene::{DENSE, GrainCylinderScene, layers};
 use crate::summary::{Figure, Quantity, Summary};
 use crate::table::Table;
 use colluvium_dem::preparation::{Amount, Packing, Relaxation, Rest, solid_fraction};
@@ -188,28 +188,15 @@ impl Recipe for GrainCylinderScene {
         Ok(self.grain_materials(origin)?)
     }
 
-    fn contact(&self) -> &LawKeys {
-        &self.contact
-    }
-
-    fn seed(&self) -> u64 {
-        self.grains.seed
-    }
-
-    fn coarse_graining(&self) -> f64 {
-        1.0
-    }
-
-    fn step(&self) -> &StepKeys {
-        &self.timestep
-    }
-
-    fn output(&self) -> &OutputKeys {
-        &self.output
-    }
-
-    fn packing(&self) -> Option<&str> {
-        self.grains.packing.as_deref()
+    fn keys(&self) -> RecipeKeys<'_> {
+        RecipeKeys {
+            contact: &self.contact,
+            seed: self.grains.seed,
+            coarse_graining: 1.0,
+            step: &self.timestep,
+            output: &self.output,
+            packing: self.grains.packing.as_deref(),
+        }
     }
 
     fn provenance(&self) -> Option<toml::Table> {

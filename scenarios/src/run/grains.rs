@@ -4,12 +4,12 @@ use super::world::boulders::{boulders, size_index};
 use super::world::fragments;
 use super::world::steps::{self, Around};
 use super::world::workshop::Surroundings;
-use super::world::{Expected, Ran, Recipe, Workshop, World};
+use super::world::{Expected, Ran, Recipe, RecipeKeys, Workshop, World};
 use crate::failure::Failure;
 use crate::scene::world::{
-    Materials, OutputKeys, Place, PrepareKind, StepKeys, bodies, bond_rules, clumps, region, walls,
+    Materials, Place, PrepareKind, bodies, bond_rules, clumps, region, walls,
 };
-use crate::scene::{GrainsScene, LawKeys, layers};
+use crate::scene::{GrainsScene, layers};
 use crate::summary::{Figure, Quantity, Summary};
 use crate::table::Table;
 use colluvium_dem::preparation::{Packing, solid_fraction};
@@ -39,28 +39,15 @@ impl Recipe for GrainsScene {
         Ok(GrainsScene::materials(self, origin)?)
     }
 
-    fn contact(&self) -> &LawKeys {
-        &self.contact
-    }
-
-    fn seed(&self) -> u64 {
-        self.seed
-    }
-
-    fn coarse_graining(&self) -> f64 {
-        self.coarse_graining
-    }
-
-    fn step(&self) -> &StepKeys {
-        &self.timestep
-    }
-
-    fn output(&self) -> &OutputKeys {
-        &self.output
-    }
-
-    fn packing(&self) -> Option<&str> {
-        self.packing.as_deref()
+    fn keys(&self) -> RecipeKeys<'_> {
+        RecipeKeys {
+            contact: &self.contact,
+            seed: self.seed,
+            coarse_graining: self.coarse_graining,
+            step: &self.timestep,
+            output: &self.output,
+            packing: self.packing.as_deref(),
+        }
     }
 
     /// All that decides a preparation; bonds, cracks and what happens afterwards do not.

@@ -65,6 +65,23 @@ pub fn edge(positions: &[f64], heights: &[f64], threshold: f64) -> f64 {
     }
 }
 
+/// The place (m) up to which a share of a heap's area lies, in columns side by side with these middles (m). Near the end of a heap
+/// it is what `edge` is without hanging on the last grains.
+pub fn place_of_share(positions: &[f64], heights: &[f64], share: f64) -> f64 {
+    let spacing = match positions {
+        [first, second, ..] => second - first,
+        _ => 0.0,
+    };
+    let mut left = share * heights.iter().sum::<f64>();
+    for (x, h) in positions.iter().zip(heights) {
+        if left <= *h && *h > 0.0 {
+            return x + (left / h - 0.5) * spacing;
+        }
+        left -= h;
+    }
+    positions.last().map_or(0.0, |x| x + 0.5 * spacing)
+}
+
 /// Height of a profile (places and heights, m) between the places at which it is known; 0 beyond them (m).
 pub fn height_at((x, h): &(Vec<f64>, Vec<f64>), at: f64) -> f64 {
     let after = x.partition_point(|place| *place < at);
@@ -202,6 +219,18 @@ mod tests {
         assert_eq!(edge(&x, &h, 1.0), 1.5);
         assert_eq!(edge(&x, &[1.0; 4], 0.5), 3.5);
         assert_eq!(edge(&x, &h, 3.0), 0.5);
+    }
+
+    #[test]
+    fn a_share_of_the_area_hangs_little_on_the_last_grain() {
+        let (x, flat) = ([0.5, 1.5, 2.5, 3.5, 4.5], [2.0, 2.0, 1.0, 0.0, 0.0]);
+        assert_eq!(place_of_share(&x, &flat, 0.8), 2.0);
+        assert_eq!(place_of_share(&x, &flat, 1.0), 3.0);
+        assert_eq!(place_of_share(&x, &flat, 0.9), 2.5);
+        // One grain far in front moves it by its share of the area, and the edge all the way.
+        let far = [2.0, 2.0, 1.0, 0.0, 0.025];
+        assert!((place_of_share(&x, &far, 0.9) - 2.5225).abs() < 1e-12);
+        assert!(edge(&x, &far, 0.02) - edge(&x, &flat, 0.02) > 1.0);
     }
 
     #[test]

@@ -164,7 +164,7 @@ impl<'a> JoinedColumn<'a> {
     }
 
     /// What the column is joined from, at a solid fraction.
-    fn spec(&self, solid_fraction: f64) -> Result<MaterialEdgeSpec, Failure> {
+    pub(super) fn spec(&self, solid_fraction: f64) -> Result<MaterialEdgeSpec, Failure> {
         let scene = self.scene;
         let settings = scene.overlap_settings(&self.origin)?;
         Ok(MaterialEdgeSpec {

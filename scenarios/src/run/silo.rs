@@ -10,10 +10,10 @@
 mod beverloo;
 
 use super::world::workshop::{Surroundings, step_for};
-use super::world::{Expected, Ran, Recipe, Workshop, World};
+use super::world::{Expected, Ran, Recipe, RecipeKeys, Workshop, World};
 use crate::failure::Failure;
-use crate::scene::world::{Materials, OutputKeys, Place, StepKeys};
-use crate::scene::{LawKeys, SiloScene, layers};
+use crate::scene::world::{Materials, Place};
+use crate::scene::{SiloScene, layers};
 use crate::summary::{Figure, Quantity, Summary};
 use crate::table::Table;
 use beverloo::{Rate, fit};
@@ -177,28 +177,15 @@ impl Recipe for SiloScene {
         Ok(SiloScene::materials(self, origin)?)
     }
 
-    fn contact(&self) -> &LawKeys {
-        &self.contact
-    }
-
-    fn seed(&self) -> u64 {
-        self.seed
-    }
-
-    fn coarse_graining(&self) -> f64 {
-        1.0
-    }
-
-    fn step(&self) -> &StepKeys {
-        &self.timestep
-    }
-
-    fn output(&self) -> &OutputKeys {
-        &self.output
-    }
-
-    fn packing(&self) -> Option<&str> {
-        self.packing.as_deref()
+    fn keys(&self) -> RecipeKeys<'_> {
+        RecipeKeys {
+            contact: &self.contact,
+            seed: self.seed,
+            coarse_graining: 1.0,
+            step: &self.timestep,
+            output: &self.output,
+            packing: self.packing.as_deref(),
+        }
     }
 
     fn provenance(&self) -> Option<toml::Table> {

@@ -13,10 +13,10 @@ mod sample;
 use super::comet;
 use super::world::fragments;
 use super::world::workshop::Surroundings;
-use super::world::{Course, Expected, Ran, Recipe, Workshop, World};
+use super::world::{Course, Expected, Ran, Recipe, RecipeKeys, Workshop, World};
 use crate::failure::Failure;
-use crate::scene::world::{Materials, OutputKeys, Place, StepKeys};
-use crate::scene::{ClampKind, LawKeys, MixKind, TensileScene, layers};
+use crate::scene::world::{Materials, Place};
+use crate::scene::{ClampKind, MixKind, TensileScene, layers};
 use crate::summary::{Figure, Quantity, Summary};
 use crate::table::Table;
 use colluvium_dem::preparation::{Packing, Relaxation, Rest, solid_fraction};
@@ -87,28 +87,15 @@ impl Recipe for TensileScene {
         Ok(TensileScene::materials(self, origin)?)
     }
 
-    fn contact(&self) -> &LawKeys {
-        &self.contact
-    }
-
-    fn seed(&self) -> u64 {
-        self.seed
-    }
-
-    fn coarse_graining(&self) -> f64 {
-        self.coarse_graining
-    }
-
-    fn step(&self) -> &StepKeys {
-        &self.timestep
-    }
-
-    fn output(&self) -> &OutputKeys {
-        &self.output
-    }
-
-    fn packing(&self) -> Option<&str> {
-        self.packing.as_deref()
+    fn keys(&self) -> RecipeKeys<'_> {
+        RecipeKeys {
+            contact: &self.contact,
+            seed: self.seed,
+            coarse_graining: self.coarse_graining,
+            step: &self.timestep,
+            output: &self.output,
+            packing: self.packing.as_deref(),
+        }
     }
 
     fn provenance(&self) -> Option<toml::Table> {

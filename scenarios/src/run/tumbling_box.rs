@@ -1,10 +1,10 @@
 //! A lander on a bed of grains: when it touches, how deep it goes, how it leaves.
 
 use super::world::workshop::{Surroundings, step_for};
-use super::world::{Course, Expected, Ran, Recipe, Workshop, World};
+use super::world::{Course, Expected, Ran, Recipe, RecipeKeys, Workshop, World};
 use crate::failure::Failure;
-use crate::scene::world::{Materials, OutputKeys, Place, StepKeys};
-use crate::scene::{LawKeys, TumblingBoxScene, layers};
+use crate::scene::world::{Materials, Place};
+use crate::scene::{TumblingBoxScene, layers};
 use crate::summary::{Figure, Quantity, Summary};
 use crate::table::Table;
 use colluvium_dem::preparation::{Amount, Packing, Relaxation, Rest};
@@ -132,28 +132,15 @@ impl Recipe for TumblingBoxScene {
         Ok(TumblingBoxScene::materials(self, origin)?)
     }
 
-    fn contact(&self) -> &LawKeys {
-        &self.contact
-    }
-
-    fn seed(&self) -> u64 {
-        self.seed
-    }
-
-    fn coarse_graining(&self) -> f64 {
-        1.0 / self.scale
-    }
-
-    fn step(&self) -> &StepKeys {
-        &self.timestep
-    }
-
-    fn output(&self) -> &OutputKeys {
-        &self.output
-    }
-
-    fn packing(&self) -> Option<&str> {
-        self.packing.as_deref()
+    fn keys(&self) -> RecipeKeys<'_> {
+        RecipeKeys {
+            contact: &self.contact,
+            seed: self.seed,
+            coarse_graining: 1.0 / self.scale,
+            step: &self.timestep,
+            output: &self.output,
+            packing: self.packing.as_deref(),
+        }
     }
 
     /// All that decides a bed; the lander does not.

@@ -24,5 +24,5 @@ pub mod workshop;
 pub use build::{Stand, World};
 pub use course::Ran;
 pub(crate) use recipe::as_the_scene;
-pub use recipe::{Course, Expected, Recipe};
+pub use recipe::{Course, Expected, Recipe, RecipeKeys};
 pub use workshop::Workshop;

@@ -33,6 +33,13 @@ pub struct BallZoneKeys {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
     pub half_width: Option<f64>,
+    /// Low and high edge of the box along x (m), from the axis, instead of half_width; at or beyond a wall of the container grains
+    /// reach up to it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub x: Option<[f64; 2]>,
+    /// The same along y.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub y: Option<[f64; 2]>,
     /// Depth of its bottom below the surface of the bed (m).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
@@ -121,6 +128,8 @@ impl Default for BallZoneKeys {
     fn default() -> Self {
         Self {
             half_width: None,
+            x: None,
+            y: None,
             depth: None,
             cell_diameters: three(),
             moving: false,
@@ -202,6 +211,51 @@ impl BallImpactScene {
             Some(given) => self.scale * given,
             None => self.ball_radius() + AROUND * diameter + self.overlap_width(diameter),
         }
+    }
+
+    /// Low and high edge of the box along x and y (m), given or computed.
+    pub fn zone_edges(&self, diameter: f64) -> [[f64; 2]; 2] {
+        let half = self.half_width(diameter);
+        [self.zones.x, self.zones.y].map(|given| match given {
+            Some(edges) => edges.map(|edge| self.scale * edge),
+            None => [-half, half],
+        })
+    }
+
+    /// Half of the container's extent along x and y (m).
+    pub fn container_edges(&self) -> [f64; 2] {
+        [self.container.length, self.container.width].map(|e| 0.5 * self.scale * e)
+    }
+
+    /// Edges of the box that are given: each ends beyond the ball and the overlap, or at a wall.
+    fn check_edges(&self, origin: &str, overlap: f64) -> Result<(), SceneError> {
+        let zones = &self.zones;
+        let place = Place {
+            origin,
+            section: "zones",
+        };
+        if let (Some(half), Some(_), Some(_)) = (zones.half_width, zones.x, zones.y) {
+            let range = "left out where zones.x and zones.y are given";
+            return Err(place.refuse("half_width", half, range));
+        }
+        let least = self.ball_radius() + overlap;
+        for ((key, given), wall) in [("x", zones.x), ("y", zones.y)]
+            .into_iter()
+            .zip(self.container_edges())
+        {
+            let Some(given) = given else { continue };
+            for (n, outwards) in [-1.0, 1.0].into_iter().enumerate() {
+                let edge = outwards * self.scale * given[n];
+                if !edge.is_finite() || edge < least.min(wall) {
+                    let [least, wall] = [least, wall].map(|w| outwards * w / self.scale);
+                    let range = format!(
+                        "at or beyond {least} (the ball and the overlap lie inside the box), or at the wall, {wall}"
+                    );
+                    return Err(place.refuse(&format!("{key}[{n}]"), given[n], range));
+                }
+            }
+        }
+        Ok(())
     }
 
     /// Depth of its bottom below the surface (m), given or computed.
@@ -359,17 +413,24 @@ impl BallImpactScene {
         let d = self.grain_diameter(&materials);
         let [half, depth] = [self.half_width(d), self.zone_depth(d)];
         let overlap = self.overlap_width(d);
-        for (key, value, least) in [
-            ("half_width", half, self.ball_radius() + overlap),
-            ("depth", depth, overlap),
+        self.check_edges(origin, overlap)?;
+        let both_given = zones.x.is_some() && zones.y.is_some();
+        for (key, value, least, is_used) in [
+            (
+                "half_width",
+                half,
+                self.ball_radius() + overlap,
+                !both_given,
+            ),
+            ("depth", depth, overlap, true),
         ] {
-            if value <= least {
+            if is_used && value <= least {
                 let range = format!("above {}: the overlap lies inside it", least / self.scale);
                 return Err(at("zones").refuse(key, value / self.scale, range));
             }
         }
-        let edges = [self.container.length, self.container.width].map(|e| 0.5 * self.scale * e);
-        if edges.iter().all(|edge| half >= *edge) {
+        let edges = self.container_edges();
+        if zones.x.is_none() && zones.y.is_none() && edges.iter().all(|edge| half >= *edge) {
             let range = format!(
                 "below {}: beyond it lies the continuum",
                 edges.iter().fold(0.0, |most: f64, e| most.max(*e)) / self.scale

@@ -120,8 +120,8 @@ pub struct ColumnOverlapKeys {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 0.0, "maximum" = 1.0e15))]
     pub impedance: Option<f64>,
-    /// With a box in a bed: shear strain after which the continuum has forgotten how its grains pressed sideways at rest (K_0);
-    /// 0.01 if left out, 0 for a continuum that presses sideways as μ(I) has it.
+    /// Shear strain after which the continuum has forgotten how its grains pressed sideways at rest (K_0); 0.01 if left out, 0 for a
+    /// continuum that presses sideways as μ(I) has it.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 0.0, "maximum" = 1000.0))]
     pub rest_strain: Option<f64>,
@@ -285,6 +285,16 @@ impl CollapseScene {
         ]
     }
 
+    /// Whether a column of grains alone could be joined where its keys say, on level ground.
+    pub fn has_room_for_a_joint(&self) -> bool {
+        let Ok(settings) = self.overlap_settings("") else {
+            return false;
+        };
+        let [least, most] = self.edge_range(settings.inner + settings.buffer);
+        let has_place = (least..=most * (1.0 + 1e-12)).contains(&self.edge());
+        has_place && self.zones.tolerance.is_none() && self.terrain.is_none()
+    }
+
     /// What a joined column needs beyond one of grains.
     pub(super) fn check_zones(&self, origin: &str) -> Result<(), SceneError> {
         self.check_grains(origin)?;
@@ -303,10 +313,6 @@ impl CollapseScene {
                 least * h + overlap + LEAST_GRAINS * d
             );
             return Err(at("").refuse("aspect", self.aspect, &range));
-        }
-        if let Some(strain) = self.overlap.rest_strain {
-            let range = "left out: what lies behind the edge of a column yields at once, and has no rest to remember";
-            return Err(at("overlap").refuse("rest_strain", strain, range));
         }
         let zones = &self.zones;
         if zones.budget.is_some() && zones.tolerance.is_none() && !zones.moving {

@@ -21,6 +21,7 @@ use crate::free_surface::faces::{Face, Faces};
 use crate::free_surface::topology::{NONE, Topology};
 use crate::free_surface::transport::{MASSLESS, Velocity};
 use crate::grid::DIMENSIONS;
+use crate::rheology::squared_norm;
 use crate::yield_step::{FlowState, PRESSURE_FLOOR};
 
 /// A step longer than the one before by more than this factor takes nothing from it.
@@ -104,7 +105,11 @@ impl<const D: usize, const C: usize> History<D, C> {
             let earlier = self.pressure[place];
             if p > PRESSURE_FLOOR && earlier > PRESSURE_FLOOR {
                 let old = before[place];
-                self.friction_change[place] = std::array::from_fn(|a| s[a] / p - old[a] / earlier);
+                let change: [f64; C] = std::array::from_fn(|a| s[a] / p - old[a] / earlier);
+                // Cohesion and viscosity leave a stress where there is hardly a pressure, so that s/p has no bound.
+                let (size, most) = (p * squared_norm(&change).sqrt(), squared_norm(s).sqrt());
+                let part = if size > most { most / size } else { 1.0 };
+                self.friction_change[place] = change.map(|change| part * change);
             }
         }
         self.pressure.fill(0.0);

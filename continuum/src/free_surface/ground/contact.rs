@@ -3,6 +3,7 @@
 use super::cuts::{MOST_PARTS, area_of_volume};
 use super::{Ground, unit};
 use crate::discretisation::QuadraturePoint;
+use crate::free_surface::faces::weight_onto;
 use crate::free_surface::operators::{Material, NEAREST_EXTRAPOLATION, POINTS, points_of};
 use crate::free_surface::topology::NONE;
 use crate::wall_friction::{PointLaw, SideWalls, WallFriction};
@@ -243,7 +244,14 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         }
         let p = self.faces.pressure[ground.master[cell]];
         if p == NONE {
-            point.pressure_offset = 0.5 * self.layer_weight(ground, cell);
+            let slides = |&j: &usize| self.faces.lies_on[j] != NONE;
+            point.pressure_offset = 0.5
+                * if point.velocities().iter().any(slides) {
+                    let weight = weight_onto(&self.acceleration, D - 1, 0);
+                    weight * self.fractions[cell] * self.grid.axes()[D - 1].spacing()
+                } else {
+                    self.layer_weight(ground, cell)
+                };
         } else {
             point.add_pressure(p, 1.0);
         }

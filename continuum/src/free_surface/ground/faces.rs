@@ -153,6 +153,13 @@ fn own_role<const D: usize>(
             return (Face::Loose, Waiting::Host { else_still: true });
         }
         let touches = cells.map(|cell| ground.wall[cell] != [0.0; D]);
+        if touches == [false; 2] {
+            let base = faces.material_under(topology, fractions, component, face);
+            if base != NONE && open && ground.open[component][base] {
+                let own = faces.take(component, face, false, base);
+                return (own, Waiting::No);
+            }
+        }
         if mass <= MASSLESS || touches == [false; 2] || thin_layer == ThinLayer::Following {
             return (Face::Loose, free);
         }

@@ -36,6 +36,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         let mut places = Vec::new();
         self.add_layers(ground, &total, &mut parts, &mut places);
         self.add_pressures(ground, &total, &mut parts);
+        self.add_pressure_on_layers(&total, &mut parts);
         for (cell, &fraction) in self.fractions.iter().enumerate() {
             if fraction > EMPTY && ground.free[cell] > 0.0 && !self.has_layer(cell) {
                 self.add_cell(ground, cell, &mut parts.points, &mut places);

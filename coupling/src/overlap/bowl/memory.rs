@@ -4,10 +4,12 @@
 //! with their lengths before them.
 
 use super::account::{self, Account, Monitors};
+use super::cells::Cells;
 use super::journey::Journey;
 use super::zone::Zone;
-use super::{Bowl, BowlSpec, OverlapError, continuum};
+use super::{Bowl, BowlSpec, Layout, OverlapError, continuum};
 use crate::overlap::sighting::free_mass;
+use colluvium_continuum::free_surface::SpaceState;
 use colluvium_dem::Simulation;
 use nalgebra::{Matrix3, Vector3};
 
@@ -95,130 +97,160 @@ impl Bowl {
         memory: &[f64],
         simulation: &Simulation,
     ) -> Result<Self, OverlapError> {
-        Self::read_back(spec, memory, simulation)?
-            .ok_or_else(|| OverlapError::Record("the bowl's memory misses a part".into()))
+        let missing = || OverlapError::Record("the bowl's memory misses a part".into());
+        let rows = Rows::of(memory).ok_or_else(missing)?;
+        let mut bowl = Self::around(spec, spec.layout(rows.height)?, simulation)?;
+        let zone = rows.zone(&bowl.layout.cells).ok_or_else(missing)?;
+        bowl.layout.has_room_for(&zone)?;
+        bowl.take_zone(zone);
+        if !rows.fit(&bowl) {
+            return Err(missing());
+        }
+        bowl.grain_mass = free_mass(simulation);
+        rows.fill(&mut bowl)?;
+        bowl.view
+            .look(&bowl.flow, &bowl.layout.cells, &bowl.units, 0.0);
+        Ok(bowl)
     }
+}
 
-    fn read_back(
-        spec: BowlSpec,
-        memory: &[f64],
-        simulation: &Simulation,
-    ) -> Result<Option<Self>, OverlapError> {
-        let cells = memory.first().map_or(0, |cells| *cells as usize);
-        let Some((front, mut rest)) = memory.split_at_checked(FRONT + 6 * cells) else {
-            return Ok(None);
-        };
+impl Layout {
+    /// Whether such a box has a cell of grains beyond its overlap.
+    fn has_room_for(&self, zone: &Zone) -> Result<(), OverlapError> {
+        let filled = self.cells.counts[2] - super::ROOM;
+        for (axis, name) in ["x", "y", "z"].into_iter().enumerate() {
+            let left = zone.inside(axis, filled, self.widths[1]);
+            if left < 1.0 {
+                return Err(OverlapError::Record(format!(
+                    "the bowl's memory has a box with {left} cells along {name} beyond its overlap; at least 1 is needed"
+                )));
+            }
+        }
+        Ok(())
+    }
+}
+
+/// What was written, by name.
+struct Rows<'a> {
+    cells: usize,
+    /// Scalars in front, and forces by cell.
+    front: [&'a [f64]; 2],
+    exchanges: f64,
+    height: f64,
+    monitors: [f64; account::MONITORED],
+    columns: &'a [f64],
+    moved: &'a [f64],
+    ratio: f64,
+    strain: &'a [f64],
+    stress: &'a [f64],
+    accelerations: &'a [f64],
+    traction: &'a [f64],
+    velocity: &'a [f64],
+    owed: &'a [f64],
+    area: &'a [f64],
+    journey: Journey,
+    corners: [f64; 5],
+    start_volume: f64,
+    unborne: Vector3<f64>,
+    state: SpaceState,
+}
+
+impl<'a> Rows<'a> {
+    /// Of a memory; nothing if a row is missing or too short.
+    fn of(memory: &'a [f64]) -> Option<Self> {
+        let cells = *memory.first()? as usize;
+        let (front, mut rest) = memory.split_at_checked(FRONT + 6 * cells)?;
         let mut take = || {
             let (length, after) = rest.split_first()?;
             let (row, after) = after.split_at_checked(*length as usize)?;
             rest = after;
             Some(row)
         };
-        let Some(&[exchanges, height]) = take() else {
-            return Ok(None);
+        let &[exchanges, height] = take()? else {
+            return None;
         };
-        let Some(monitors) = take().and_then(|row| row.try_into().ok()) else {
-            return Ok(None);
-        };
-        let rows = (|| {
-            let row = [take()?, take()?, take()?, take()?, take()?, take()?];
-            Some((row, [take()?, take()?, take()?, take()?]))
-        })();
-        let Some((
-            [columns, moved, ratio, strain, stress, accelerations],
-            [traction, velocity, owed, area],
-        )) = rows
-        else {
-            return Ok(None);
-        };
-        let Some(journey) = Journey::read(&mut take) else {
-            return Ok(None);
-        };
-        let (Some(&[x, y, z, high_x, high_y]), Some(&[start_volume]), Some(&[u, v, w])) =
-            (take(), take(), take())
-        else {
-            return Ok(None);
-        };
-        let Some(state) = continuum::read(&mut take) else {
-            return Ok(None);
-        };
-        let mut bowl = Self::around(spec, spec.layout(height)?, simulation)?;
-        let [low_x, low_y, low_z, high_x, high_y] = [x, y, z, high_x, high_y].map(|n| n as usize);
-        let grid = bowl.layout.cells.counts;
-        if high_x > grid[0]
-            || high_y > grid[1]
-            || low_x >= high_x
-            || low_y >= high_y
-            || low_z >= grid[2]
-        {
-            return Ok(None);
-        }
-        let cells = bowl.layout.cells;
-        let zone = Zone::new(&cells, [low_x, low_y, low_z], [high_x, high_y]);
-        let filled = cells.counts[2] - super::ROOM;
-        let left = |axis: usize| zone.inside(axis, filled, bowl.layout.widths[1]);
-        if let Some(axis) = (0..3).find(|axis| left(*axis) < 1.0) {
-            let name = ["x", "y", "z"][axis];
-            return Err(OverlapError::Record(format!(
-                "the bowl's memory has a box with {} cells along {name} beyond its overlap; at least 1 is needed",
-                left(axis)
-            )));
-        }
-        bowl.take_zone(zone);
-        bowl.journey = journey;
-        bowl.start_volume = start_volume;
-        bowl.unborne = Vector3::new(u, v, w);
-        let cells = cells.count();
-        let (layer, faces) = (
-            bowl.layout.cells.counts[0] * bowl.layout.cells.counts[1],
-            bowl.faces.all.len(),
-        );
-        let fits = memory[0] as usize == cells
-            && columns.len() == layer
-            && moved.len() == faces
-            && ratio.len() == 1
-            && strain.len() == 5 * cells
-            && stress.len() == 6 * cells
-            && accelerations.len() == 3 * cells
-            && owed.len() == 3 * cells
-            && traction.len() == 3 * faces
-            && velocity.len() == 3 * faces
-            && area.len() == faces;
-        let (scalars, forces) = front.split_at(FRONT);
-        let Ok(account) = scalars[16..].try_into() else {
-            return Ok(None);
-        };
-        if !fits {
-            return Ok(None);
-        }
-        bowl.grain_mass = free_mass(simulation);
-        bowl.columns = columns.to_vec();
-        bowl.moved = moved.to_vec();
-        bowl.view.rest.ratio = ratio[0];
-        bowl.view.rest.strain = strain.as_chunks::<5>().0.to_vec();
-        let stresses = stress.as_chunks::<6>().0.iter();
+        // In the order of `write`.
+        Some(Self {
+            cells,
+            front: front.split_at(FRONT).into(),
+            exchanges,
+            height,
+            monitors: take()?.try_into().ok()?,
+            columns: take()?,
+            moved: take()?,
+            ratio: *take()?.first()?,
+            strain: take()?,
+            stress: take()?,
+            accelerations: take()?,
+            traction: take()?,
+            velocity: take()?,
+            owed: take()?,
+            area: take()?,
+            journey: Journey::read(&mut take)?,
+            corners: take()?.try_into().ok()?,
+            start_volume: *take()?.first()?,
+            unborne: *vectors(take()?).first()?,
+            state: continuum::read(&mut take)?,
+        })
+    }
+
+    /// The box, if it lies in the grid.
+    fn zone(&self, cells: &Cells) -> Option<Zone> {
+        let [low_x, low_y, low_z, x, y] = self.corners.map(|n| n as usize);
+        let counts = cells.counts;
+        let lies_inside =
+            low_x < x && x <= counts[0] && low_y < y && y <= counts[1] && low_z < counts[2];
+        lies_inside.then(|| Zone::new(cells, [low_x, low_y, low_z], [x, y]))
+    }
+
+    /// Whether the rows are as long as this bowl's.
+    fn fit(&self, bowl: &Bowl) -> bool {
+        let grid = &bowl.layout.cells;
+        let (cells, faces) = (grid.count(), bowl.faces.all.len());
+        self.cells == cells
+            && self.columns.len() == grid.counts[0] * grid.counts[1]
+            && self.strain.len() == 5 * cells
+            && self.stress.len() == 6 * cells
+            && self.accelerations.len() == 3 * cells
+            && self.owed.len() == 3 * cells
+            && self.traction.len() == 3 * faces
+            && self.velocity.len() == 3 * faces
+            && [self.moved, self.area].map(<[f64]>::len) == [faces; 2]
+    }
+
+    /// Makes the bowl what it was.
+    fn fill(self, bowl: &mut Bowl) -> Result<(), OverlapError> {
+        let [scalars, forces] = self.front;
+        bowl.journey = self.journey;
+        bowl.start_volume = self.start_volume;
+        bowl.unborne = self.unborne;
+        bowl.columns = self.columns.to_vec();
+        bowl.moved = self.moved.to_vec();
+        bowl.view.rest.ratio = self.ratio;
+        bowl.view.rest.strain = self.strain.as_chunks::<5>().0.to_vec();
+        let stresses = self.stress.as_chunks::<6>().0.iter();
         bowl.sums.stress = stresses
             .map(|&[xx, yy, zz, xy, xz, yz]| Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
             .collect();
-        bowl.held.accelerations = vectors(accelerations);
-        bowl.held.traction = vectors(traction);
-        bowl.held.velocity = vectors(velocity);
-        bowl.held.area = area.to_vec();
-        bowl.owed = vectors(owed);
-        bowl.monitors = Monitors::of(monitors);
+        bowl.held.accelerations = vectors(self.accelerations);
+        bowl.held.traction = vectors(self.traction);
+        bowl.held.velocity = vectors(self.velocity);
+        bowl.held.area = self.area.to_vec();
+        bowl.owed = vectors(self.owed);
+        bowl.monitors = Monitors::of(&self.monitors);
         bowl.monitors.grain_steps = scalars[3];
-        bowl.exchanges = exchanges as u64;
+        bowl.exchanges = self.exchanges as u64;
         bowl.made = scalars[1] as u64;
         bowl.laid_at = scalars[2] as u64;
         for (k, given) in [&mut bowl.laid, &mut bowl.given].into_iter().enumerate() {
             let pair = vectors(&scalars[4 + 6 * k..10 + 6 * k]);
             (given.traction, given.impedance) = (pair[0], pair[1]);
-            given.relaxation = vectors(&forces[3 * cells * k..3 * cells * (k + 1)]);
+            given.relaxation = vectors(&forces[3 * self.cells * k..3 * self.cells * (k + 1)]);
         }
-        bowl.account = Account::of(account);
-        bowl.flow.set_state(state)?;
-        bowl.view
-            .look(&bowl.flow, &bowl.layout.cells, &bowl.units, 0.0);
-        Ok(Some(bowl))
+        let mut account = [0.0; account::NUMBERS];
+        account.copy_from_slice(&scalars[16..]);
+        bowl.account = Account::of(&account);
+        bowl.flow.set_state(self.state)?;
+        Ok(())
     }
 }

@@ -74,8 +74,8 @@ pub struct BowlSpec {
     pub law: MuI,
     /// Settings of the continuum's solver.
     pub options: SurfaceOptions,
-    /// Half of the box's extent along x and y, about the middle of the bed (m), rounded to cells.
-    pub half: [f64; 2],
+    /// Low and high edge of the box along x and y (m), rounded to cells; at or beyond a wall of the bed it has no side there.
+    pub edges: [[f64; 2]; 2],
     /// Height of its bottom above the floor (m), rounded to cells.
     pub bottom: f64,
     /// Widths, times and the impedance.
@@ -122,7 +122,7 @@ impl BowlSpec {
     /// Whether a box, its overlap and some continuum around it have room in a bed of this height (m).
     ///
     /// # Errors
-    /// [`OverlapError::OutOfRange`] with `half_width` or `bottom`.
+    /// [`OverlapError::OutOfRange`] with `x`, `y` (the upper edge along it) or `bottom`.
     pub fn check(&self, height: f64) -> Result<(), OverlapError> {
         self.layout(height).map(drop)
     }
@@ -143,29 +143,30 @@ impl BowlSpec {
             ],
         };
         let widths = self.widths();
-        let margin = |axis: usize| {
-            let count = cells.counts[axis] as f64;
-            let margin = 0.5 * count - self.half[axis] / cells.spacing[axis];
-            margin.round().max(0.0) as usize
-        };
-        let [mx, my] = [margin(0), margin(1)];
+        // From both walls inwards, so that a box in the middle stays in the middle.
+        let margins = [0, 1].map(|axis| {
+            let [low, high] = self.edges[axis];
+            let wall = self.low[axis] + self.size[axis];
+            [low - self.low[axis], wall - high]
+                .map(|margin| (margin / cells.spacing[axis]).round().max(0.0) as usize)
+        });
         let mz = (self.bottom / cells.spacing[2]).round().max(0.0) as usize;
         let zone = Zone::new(
             &cells,
-            [mx, my, mz],
-            [x.saturating_sub(mx), y.saturating_sub(my)],
+            [margins[0][0], margins[1][0], mz],
+            [
+                x.saturating_sub(margins[0][1]),
+                y.saturating_sub(margins[1][1]),
+            ],
         );
-        for (axis, key, value) in [
-            (0, "half_width", self.half[0]),
-            (1, "half_width", self.half[1]),
-            (2, "bottom", self.bottom),
-        ] {
+        let [x, y] = self.edges.map(|[_, high]| high);
+        for (axis, key, value) in [(0, "x", x), (1, "y", y), (2, "bottom", self.bottom)] {
             let allowed = "such that a cell of grains is left beyond the overlap";
             let left = zone.inside(axis, filled, widths[1]);
             check(key, value, left >= 1.0, allowed)?;
         }
         let allowed = "such that some continuum is left around the grains";
-        check("half_width", self.half[0], !zone.sides.is_empty(), allowed)?;
+        check("x", x, !zone.sides.is_empty(), allowed)?;
         Ok(Layout {
             cells,
             zone,

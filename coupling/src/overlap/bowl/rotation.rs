@@ -62,7 +62,7 @@ fn joined(rate: Vector3<f64>, drift: Vector3<f64>, ours: Vector3<f64>) -> Bowl {
         gravity: 1.0,
         law: MuI::new(0.36, 0.70, 0.3, 1.0, 1.9 * 0.52, 1.0),
         options: SurfaceOptions::default(),
-        half: [9.0; 2],
+        edges: [[0.5 * width - 9.0, 0.5 * width + 9.0]; 2],
         bottom: 2.0,
         settings: settings.resolve(&scales, false).unwrap(),
         ball: None,

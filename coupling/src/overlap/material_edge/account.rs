@@ -141,13 +141,13 @@ pub struct Monitors {
     pub slip: f64,
     /// Largest of these (m/s).
     pub largest_slip: f64,
-    /// Σ of the force along x of the contacts that cross the handshake surface, and of the continuum's σ_xx (N).
+    /// Σ of the force along x through the handshake surface, of what crosses it as grains and of the continuum's stress (N).
     pub force: [f64; 2],
     /// Σ of the grains' mass in the full cells of the overlap, over that of the continuum in them.
     pub packing: f64,
     /// Σ |impulse| of the relaxation, cell by cell, and of the traction, row by row (N s).
     pub impulse: [f64; 2],
-    /// Most grains beyond the edge by more than a diameter.
+    /// Most grains beyond the edge by more than a diameter along its normal.
     pub escaped: f64,
     /// Grains times their steps.
     pub grain_steps: f64,
@@ -210,7 +210,12 @@ impl Monitors {
         self.slip / self.exchanges.max(1.0)
     }
 
-    /// Force of the grains' σ_xx over that of the continuum's at the handshake surface.
+    /// Mean forces along x of grains and continuum through the handshake surface (N).
+    pub fn forces(&self) -> [f64; 2] {
+        self.force.map(|sum| sum / self.exchanges.max(1.0))
+    }
+
+    /// Force of the grains over that of the continuum at the handshake surface.
     pub fn force_ratio(&self) -> f64 {
         self.force[0] / self.force[1]
     }

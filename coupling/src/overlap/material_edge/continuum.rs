@@ -1,6 +1,7 @@
 //! The continuum's side in SI units, cell by cell.
 
 use super::cells::Cells;
+use crate::overlap::rest_stress::RestStress;
 use colluvium_continuum::column_collapse::Collapse;
 use colluvium_continuum::free_surface::SurfaceState;
 
@@ -20,6 +21,8 @@ pub struct View {
     pub pressure: Vec<f64>,
     /// ((σ_xx − σ_zz)/2, σ_xz), positive in tension (Pa).
     pub stress: Vec<[f64; 2]>,
+    /// What is remembered of the grains' rest.
+    pub rest: RestStress,
 }
 
 impl View {
@@ -53,6 +56,29 @@ impl View {
         self.fraction[cell] > FULL
     }
 
+    /// Takes the shear of a time (s) into what is remembered: differences of velocities between full cells.
+    pub fn shear(&mut self, cells: &Cells, dt: f64) {
+        let [columns, rows] = cells.counts;
+        for cell in (0..cells.count()).filter(|cell| self.fraction[*cell] > FULL) {
+            let (i, k) = (cell % columns, cell / columns);
+            let slope = |index: usize, count: usize, step: usize| {
+                let full = |is_there: bool, to: usize| match is_there && self.is_full(to) {
+                    true => to,
+                    false => cell,
+                };
+                let low = full(index > 0, cell.wrapping_sub(step));
+                let high = full(index + 1 < count, cell + step);
+                let steps = ((high - low) / step).max(1) as f64;
+                let change = |axis: usize| self.velocity[high][axis] - self.velocity[low][axis];
+                [0, 1].map(|axis| change(axis) / (steps * cells.spacing))
+            };
+            let ([ux, wx], [uz, wz]) = (slope(i, columns, 1), slope(k, rows, columns));
+            let strain = &mut self.rest.strain[cell];
+            strain[0] += (ux - wz) * dt;
+            strain[1] += (uz + wx) * dt;
+        }
+    }
+
     /// Velocity at a place from the full cells around it; none without any.
     pub fn velocity_at(&self, hats: &[(usize, f64); 4]) -> Option<[f64; 2]> {
         let (mut sum, mut weight) = ([0.0; 2], 0.0);
@@ -65,8 +91,8 @@ impl View {
         (weight > 0.0).then(|| sum.map(|s| s / weight))
     }
 
-    /// Filled part, σ_xx, σ_zz, σ_xz (Pa) and velocity at a place in a row, from the cells beside it; none where
-    /// neither is full.
+    /// Filled part, σ_xx with what is remembered, σ_zz, σ_xz (Pa) and velocity at a place in a row, from the cells beside it;
+    /// none where neither is full.
     pub fn across(&self, cells: &Cells, x: f64, row: usize) -> Option<(f64, [f64; 3], [f64; 2])> {
         let columns = cells.counts[0];
         let place = cells.offset(x);
@@ -90,7 +116,9 @@ impl View {
                 false => 1.0,
             };
             let (p, [s, tau]) = (factor * self.pressure[cell].max(0.0), self.stress[cell]);
-            for (sum, part) in sigma.iter_mut().zip([s - p, -s - p, tau]) {
+            let zz = -s - p;
+            let xx = self.rest.of_grains(cell, s - p, zz);
+            for (sum, part) in sigma.iter_mut().zip([xx, zz, tau]) {
                 *sum += hat * part;
             }
             for (sum, u) in velocity.iter_mut().zip(self.velocity[cell]) {

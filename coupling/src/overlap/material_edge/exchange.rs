@@ -2,7 +2,7 @@
 
 use super::cells::over;
 use super::embedded::Embedded;
-use super::rows::{Load, Row, bearers, displacements, slopes};
+use super::rows::{Load, Row, bearers, slopes};
 use super::{MaterialEdge, OverlapError};
 use colluvium_dem::{GrainSample, Simulation};
 
@@ -11,11 +11,9 @@ const LEAST_COVER: f64 = 0.3;
 /// Parts of a full cell's mass at which grains begin to cover a surface, and cover it all.
 const COVERS: [f64; 2] = [0.4, 0.7];
 /// Rows with less than this of a full row of shell hand on what presses on them: a force on few grains throws them out.
-const LEAST_ROW: f64 = 0.3;
+pub(super) const LEAST_ROW: f64 = 0.3;
 /// Steepest slope of the edge that its area vector follows.
-const STEEPEST: f64 = 2.0;
-/// Half width in diameters of the band of labels in which a surface is looked for.
-const BAND: f64 = 1.0;
+pub(super) const STEEPEST: f64 = 2.0;
 
 /// Room for what is formed and forgotten in a step.
 #[derive(Clone, Debug, Default)]
@@ -186,6 +184,7 @@ impl MaterialEdge {
             self.copy_the_grains(dt)?;
         }
         self.step_continuum(dt, self.exchanges + 1)?;
+        self.view.shear(&self.cells, dt);
         self.agree();
         self.watch();
         Ok(())
@@ -224,6 +223,7 @@ impl MaterialEdge {
         for cell in 0..self.cells.count() {
             let cover = &self.sums.cover[cell];
             let [xx, zz, xz] = self.sums.stress[cell];
+            let xx = self.view.rest.of_continuum(cell, xx, zz);
             let part = cover.mass / full;
             let outside = &mut self.outside;
             outside.pressure[cell] = (-0.5 * (xx + zz) * stress).max(0.0);
@@ -368,29 +368,9 @@ impl MaterialEdge {
         }
     }
 
-    /// Where the surface of a label is, row by row (m): its place at the start, moved by the mean displacement of
-    /// the grains of nearby labels.
+    /// Where the surface of a label is, row by row (m): [`Labels::surface`](super::labels::Labels::surface).
     pub(super) fn surface_of(&self, label: f64) -> Vec<f64> {
-        let band = BAND * self.spec.case.rheology.diameter;
-        let mut sums = vec![[0.0; 2]; self.cells.counts[1]];
-        for grain in &self.sighting.snapshot.grains {
-            let Some(own) = self.labels.of(grain) else {
-                continue;
-            };
-            if (own - label).abs() < band {
-                let base = self.labels.base_at(&self.cells, grain.position.z);
-                let moved = grain.position.x - base - own;
-                for (row, hat) in self.cells.rows(grain.position.z) {
-                    sums[row][0] += grain.mass * hat;
-                    sums[row][1] += grain.mass * hat * moved;
-                }
-            }
-        }
-        let least = LEAST_ROW * self.spec.density() * band * self.cells.spacing * self.spec.slab;
-        let moved = displacements(&sums, least).into_iter();
-        moved
-            .zip(&self.labels.base)
-            .map(|(moved, base)| base + label + moved)
-            .collect()
+        let grains = &self.sighting.snapshot.grains;
+        self.labels.surface(&self.cells, grains, label, &self.spec)
     }
 }

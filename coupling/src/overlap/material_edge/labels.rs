@@ -10,14 +10,19 @@
 //! ξ ← max(ζ, 0)   where |ζ − ξ| > b and min(ζ, ξ) < ξ_a,      b the width of the shell
 //! ```
 
-use super::MaterialEdge;
 use super::cells::Cells;
+use super::exchange::LEAST_ROW;
+use super::rows::displacements;
+use super::{MaterialEdge, MaterialEdgeSpec};
 use colluvium_dem::GrainSample;
 
 /// Stands for the label of what has none.
 pub(super) const NO_LABEL: f64 = f64::MAX;
 /// Overlaps squeezed to less than this part of their width say nothing of labels.
 const SQUEEZED: f64 = 0.2;
+
+/// Half width in diameters of the band of labels in which a surface is looked for.
+const BAND: f64 = 1.0;
 
 /// Labels of grains: distances from the edge along x when they were given, at the start or when the edge moved on.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -35,6 +40,68 @@ impl Labels {
     pub fn of(&self, grain: &GrainSample) -> Option<f64> {
         let label = self.given.get(grain.id as usize).copied();
         label.filter(|label| *label < NO_LABEL && !grain.fixed)
+    }
+
+    /// Where the surface of a label is, row by row (m): its place at the start, moved by the mean displacement of
+    /// the grains of nearby labels.
+    pub fn surface(
+        &self,
+        cells: &Cells,
+        grains: &[GrainSample],
+        label: f64,
+        spec: &MaterialEdgeSpec,
+    ) -> Vec<f64> {
+        let band = BAND * spec.case.rheology.diameter;
+        let mut sums = vec![[0.0; 2]; cells.counts[1]];
+        for grain in grains {
+            let Some(own) = self.of(grain) else {
+                continue;
+            };
+            if (own - label).abs() < band {
+                let base = self.base_at(cells, grain.position.z);
+                let moved = grain.position.x - base - own;
+                for (row, hat) in cells.rows(grain.position.z) {
+                    sums[row][0] += grain.mass * hat;
+                    sums[row][1] += grain.mass * hat * moved;
+                }
+            }
+        }
+        let least = LEAST_ROW * spec.density() * band * cells.spacing * spec.slab;
+        let moved = displacements(&sums, least).into_iter();
+        moved
+            .zip(&self.base)
+            .map(|(moved, base)| base + label + moved)
+            .collect()
+    }
+
+    /// Renews the labels of grains that are not among their neighbours any more, where surfaces with the labels `at` lie
+    /// at `places` row by row, and says how many.
+    pub fn renew(
+        &mut self,
+        cells: &Cells,
+        grains: &[GrainSample],
+        places: [&[f64]; 3],
+        (at, shell): ([f64; 3], f64),
+    ) -> f64 {
+        let inner = at[2];
+        let mut renewed = 0.0;
+        for grain in grains {
+            let Some(label) = self.of(grain) else {
+                continue;
+            };
+            let rows = cells.rows(grain.position.z);
+            let here = places.map(|of| rows.iter().map(|&(row, hat)| hat * of[row]).sum::<f64>());
+            let is_squeezed = |k: usize| here[k + 1] - here[k] < SQUEEZED * (at[k + 1] - at[k]);
+            if is_squeezed(0) || is_squeezed(1) {
+                continue;
+            }
+            let now = coordinate(grain.position.x, here, at);
+            if (now - label).abs() > shell && now.min(label) < inner {
+                self.given[grain.id as usize] = now.max(0.0);
+                renewed += 1.0;
+            }
+        }
+        renewed
     }
 
     /// Where the edge was at a height when labels were given (m).
@@ -59,35 +126,12 @@ impl MaterialEdge {
     /// Renews the labels of what is not among its neighbours any more.
     pub(super) fn renew_labels(&mut self) {
         let [handshake, inner] = self.spec.zones();
-        let at = [0.0, handshake, inner];
+        let edge: Vec<f64> = self.held.rows.iter().map(|row| row.place).collect();
         let far = self.surface_of(inner);
-        let mut renewed = 0.0;
-        for grain in &self.sighting.snapshot.grains {
-            let Some(label) = self.labels.of(grain) else {
-                continue;
-            };
-            let mut places = [0.0; 3];
-            for (row, hat) in self.cells.rows(grain.position.z) {
-                let of_row = [
-                    self.held.rows[row].place,
-                    self.held.handshake[row],
-                    far[row],
-                ];
-                for (place, of_row) in places.iter_mut().zip(of_row) {
-                    *place += hat * of_row;
-                }
-            }
-            let is_squeezed = |k: usize| places[k + 1] - places[k] < SQUEEZED * (at[k + 1] - at[k]);
-            if is_squeezed(0) || is_squeezed(1) {
-                continue;
-            }
-            let now = coordinate(grain.position.x, places, at);
-            if (now - label).abs() > self.spec.settings.shell && now.min(label) < inner {
-                self.labels.given[grain.id as usize] = now.max(0.0);
-                renewed += 1.0;
-            }
-        }
-        self.monitors.renewed += renewed;
+        let places = [&edge, &self.held.handshake, &far].map(Vec::as_slice);
+        let at = ([0.0, handshake, inner], self.spec.settings.shell);
+        let grains = &self.sighting.snapshot.grains;
+        self.monitors.renewed += self.labels.renew(&self.cells, grains, places, at);
     }
 }
 

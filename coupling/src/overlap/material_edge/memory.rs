@@ -7,6 +7,7 @@ use super::account::{self, Account, Monitors};
 use super::rows::{self, Row};
 use super::travel::{Journey, Move};
 use super::{MaterialEdge, MaterialEdgeSpec, OverlapError, continuum};
+use colluvium_continuum::strain::SPACE_COMPONENTS;
 use colluvium_dem::{Patch, Simulation};
 
 /// Numbers in front but for the two rows of forces by cell, the account among them.
@@ -75,6 +76,8 @@ impl MaterialEdge {
         put(&rows);
         put(&self.held.handshake);
         put(self.owed.as_flattened());
+        put(&[self.view.rest.ratio]);
+        put(self.view.rest.strain.as_flattened());
         continuum::write(self.collapse.flow().state(), &mut put);
     }
 
@@ -149,12 +152,16 @@ impl MaterialEdge {
         else {
             return Ok(None);
         };
+        let Some((&[ratio], strain)) = take().zip(take()) else {
+            return Ok(None);
+        };
         let Some(state) = continuum::read(&mut take) else {
             return Ok(None);
         };
         let fits = stress.len() == 3 * cells
             && accelerations.len() == 2 * cells
             && owed.len() == 2 * cells
+            && strain.len() == SPACE_COMPONENTS * cells
             && edge_rows.len() == rows::NUMBERS * handshake.len()
             && handshake.len() == edge.cells.counts[1]
             && edge.cells.count() == cells;
@@ -188,6 +195,8 @@ impl MaterialEdge {
         edge.weigh(simulation);
         edge.collapse.set_state(state)?;
         edge.view.look(&edge.collapse, &edge.cells);
+        edge.view.rest.ratio = ratio;
+        edge.view.rest.strain = strain.as_chunks().0.to_vec();
         Ok(Some(edge))
     }
 }

@@ -2,6 +2,9 @@
 
 use super::MaterialEdge;
 use super::cells::over;
+use super::exchange::STEEPEST;
+use super::rows::slopes;
+use super::witness::Through;
 use colluvium_dem::GrainSample;
 
 /// How far beyond the edge a grain has escaped, in diameters.
@@ -17,22 +20,40 @@ impl MaterialEdge {
         self.monitors.impulse[1] += traction * self.exchange_time();
     }
 
-    /// Force along x (N) of the contacts that cross the handshake surface. Averages over cells would be too low by what the
+    /// What goes through the handshake surface as grains. Averages over cells would be too low by what the
     /// shell, which bears forces from outside, has of them.
-    fn through_handshake(&self) -> f64 {
-        let inside = |g: &GrainSample| self.labels.of(g).map(|_| self.counts(g));
-        let crossing = self.sighting.crossing(inside);
-        crossing.map(|(_, force)| force.x).sum()
+    fn through_handshake(&self) -> Through {
+        Through::of(
+            &self.sighting,
+            (&self.labels, &self.cells),
+            (&self.held.handshake, self.spec.settings.buffer),
+            self.spec.case.rheology.diameter,
+        )
+    }
+
+    /// How many grains lie beyond the edge by more than a diameter, along its normal: where it leans, material at rest below what
+    /// has moved lies far behind it along x and close to it all the same.
+    fn escaped(&self) -> usize {
+        let d = self.spec.case.rheology.diameter;
+        let places: Vec<f64> = self.held.rows.iter().map(|row| row.place).collect();
+        let slopes = slopes(&places, &self.cells);
+        let far = |g: &&GrainSample| {
+            let rows = self.cells.rows(g.position.z);
+            let at = |of: &[f64]| rows.iter().map(|&(row, hat)| hat * of[row]).sum::<f64>();
+            let behind = (at(&places) - g.position.x) / 1.0_f64.hypot(at(&slopes));
+            self.labels.of(g).is_some() && behind > ESCAPED * d
+        };
+        self.sighting.snapshot.grains.iter().filter(far).count()
     }
 
     /// Looks at both sides of the handshake surface.
     pub(super) fn watch(&mut self) {
-        let d = self.spec.case.rheology.diameter;
         let columns = self.cells.counts[0];
         let (mut slips, mut weights) = (0.0, 0.0);
-        let mut pressed = 0.0;
+        let (mut pressed, mut leaning) = (0.0, 0.0);
+        let slopes = slopes(&self.held.handshake, &self.cells);
         for (k, &place) in self.held.handshake.iter().enumerate() {
-            let Some((fraction, [xx, _, _], _)) = self.view.across(&self.cells, place, k) else {
+            let Some((fraction, [xx, _, xz], _)) = self.view.across(&self.cells, place, k) else {
                 continue;
             };
             let at = self.cells.offset(place);
@@ -50,6 +71,7 @@ impl MaterialEdge {
                 }
             }
             pressed -= fraction * xx;
+            leaning += fraction * xz * slopes[k].clamp(-STEEPEST, STEEPEST);
         }
         let area = self.cells.spacing * self.spec.slab;
         let through = self.through_handshake();
@@ -64,18 +86,13 @@ impl MaterialEdge {
                 cells += 1.0;
             }
         }
-        let places: Vec<f64> = self.held.rows.iter().map(|row| row.place).collect();
-        let escaped = self.sighting.snapshot.grains.iter().filter(|g| {
-            let row = self.cells.rows(g.position.z)[0].0;
-            self.labels.of(g).is_some() && g.position.x < places[row] - ESCAPED * d
-        });
-        let escaped = escaped.count() as f64;
+        let escaped = self.escaped() as f64;
         let m = &mut self.monitors;
         m.exchanges += 1.0;
         m.slip += slip;
         m.largest_slip = m.largest_slip.max(slip);
-        m.force[0] += through;
-        m.force[1] += pressed * area;
+        m.force[0] += through.sum();
+        m.force[1] += (pressed + leaning) * area;
         m.packing += over(packed, cells);
         m.escaped = m.escaped.max(escaped);
     }

@@ -3,6 +3,9 @@
 //! The whole bed is settled as grains, the same as with `model = "dem"`; at the start what lies beyond the box becomes
 //! continuum (`coupling::overlap::bowl`). Preparation, walls, ball and step are those of the bed of grains.
 
+mod findings;
+mod plan;
+
 use super::super::surface_fields::space_frame;
 use super::super::world::{Course, Expected, Ran, Recipe, as_the_scene};
 use super::of_ball;
@@ -11,7 +14,7 @@ use crate::failure::Failure;
 use crate::rheology_file::RheologyFile;
 use crate::run_directory::RunDirectory;
 use crate::scene::world::Materials;
-use crate::scene::{BallImpactScene, DENSE, overlap_words};
+use crate::scene::{BallImpactScene, DENSE};
 use crate::state_hash;
 use crate::summary::{Quantity, Summary};
 use crate::table::Table;
@@ -19,15 +22,12 @@ use crate::vtkhdf::Frame;
 use colluvium_continuum::free_surface::SurfaceOptions;
 use colluvium_continuum::rheology::MuI;
 use colluvium_coupling::overlap::OverlapError;
-use colluvium_coupling::overlap::bowl::{Bowl, BowlSpec, Growth};
+use colluvium_coupling::overlap::bowl::{Bowl, BowlSpec};
 use colluvium_dem::preparation::{ShearedCell, solid_fraction};
 use colluvium_dem::{Simulation, Snapshot};
 use std::path::Path;
 use std::sync::{Mutex, MutexGuard, PoisonError};
 
-/// Limits of the monitors: slip over the ball's speed, ratio of forces less 1.
-const MOST_SLIP: f64 = 0.01;
-const MOST_RATIO: f64 = 0.05;
 /// Numbers in front of the bowl's in the memory: solid fraction and surface of the bed.
 const HEAD: usize = 3;
 
@@ -58,7 +58,9 @@ impl JoinedBed<'_> {
                 let scale = self.scene.scale;
                 let floor = self.scene.container.floor;
                 let (key, value) = match key {
-                    "half_width" => ("zones.half_width", value / scale),
+                    "x" if self.scene.zones.x.is_some() => ("zones.x[1]", value / scale),
+                    "y" if self.scene.zones.y.is_some() => ("zones.y[1]", value / scale),
+                    "x" | "y" => ("zones.half_width", value / scale),
                     "bottom" => ("zones.depth, whose bottom lies at z", floor + value / scale),
                     _ => (key, value),
                 };
@@ -112,14 +114,13 @@ impl<'a> JoinedBed<'a> {
         let scene = self.scene;
         let (law, valid) = self.law(solid)?;
         let size = [scene.container.length, scene.container.width].map(|e| scene.scale * e);
-        let half = scene.half_width(law.diameter);
         let settings = scene.overlap_settings(&self.origin)?;
         Ok(BowlSpec {
             low: [-0.5 * size[0], -0.5 * size[1], scene.floor()],
             size,
             gravity: scene.gravity,
             options: SurfaceOptions::default(),
-            half: [half; 2],
+            edges: scene.zone_edges(law.diameter),
             bottom: (surface - scene.zone_depth(law.diameter) - scene.floor()).max(0.0),
             growth: scene.growth(law.diameter, &settings, valid),
             settings,
@@ -166,36 +167,6 @@ impl<'a> JoinedBed<'a> {
         *state = memory;
     }
 
-    /// What else a side goes outwards for, and what comes back.
-    fn strips(&self, growth: &Growth) -> String {
-        let scene = self.scene;
-        let limit = |value: f64, key: &str| match value.is_finite() {
-            true => format!("{value:.3} ({key})"),
-            false => format!("none ({key} left out)"),
-        };
-        let back = match scene.returns_sheared() {
-            true => format!(
-                "there grains of packings come in their place: of {} grains each, sheared before the run at I of {:?} under one or two \
-                 pressures (zones.returning, zones.sheared_inertial, zones.sheared_grains)",
-                scene.sheared_grains(),
-                scene.sheared_inertial(),
-            ),
-            false => "stored grains come back where the continuum has carried them".into(),
-        };
-        format!(
-            "a side goes outwards, too, where the continuum beside it is sheared faster than I = {}, or what is stored there has been \
-             sheared by more than {}; {back}",
-            match (scene.zones.fastest_inertial, growth.fastest.is_finite()) {
-                (None, true) => format!(
-                    "{:.3} (computed: the calibrated law's range ends there; zones.fastest_inertial left out)",
-                    growth.fastest
-                ),
-                _ => limit(growth.fastest, "zones.fastest_inertial"),
-            },
-            limit(growth.misplaced, "zones.misplaced_shear"),
-        )
-    }
-
     /// Height of the bed (m), before it is there to be measured.
     fn expected_height(&self, diameter: f64) -> f64 {
         let scene = self.scene;
@@ -211,9 +182,10 @@ impl<'a> JoinedBed<'a> {
             return [1.0; 2];
         };
         let d = scene.grain_diameter(&materials);
-        let half = scene.half_width(d);
-        let edges = [scene.container.length, scene.container.width].map(|e| 0.5 * scene.scale * e);
-        let across: f64 = edges.iter().map(|edge| (half / edge).min(1.0)).product();
+        let edges = scene.zone_edges(d).into_iter().zip(scene.container_edges());
+        let across: f64 = edges
+            .map(|([low, high], wall)| (high.min(wall) - low.max(-wall)) / (2.0 * wall))
+            .product();
         let start = scene.zone_depth(d);
         let last = match scene.zones.moving {
             true => start.max(scene.lasting_depth(d)),
@@ -287,77 +259,7 @@ impl Recipe for JoinedBed<'_> {
     }
 
     fn plan(&self) -> Vec<(String, String)> {
-        let mut lines = self.scene.plan();
-        let scene = self.scene;
-        let (Ok(materials), Ok(s)) = (
-            scene.materials(&self.origin),
-            scene.overlap_settings(&self.origin),
-        ) else {
-            return lines;
-        };
-        let d = scene.grain_diameter(&materials);
-        let why = |given: Option<f64>| match given {
-            Some(_) => "given",
-            None => "computed",
-        };
-        lines.push((
-            "zones".into(),
-            format!(
-                "grains within {:.4} m ({:.1} d; zones.half_width {}) of the axis along x and y and {:.4} m ({:.1} d; zones.depth {}) \
-                 below the surface, continuum beyond; {:.0} % of the grain-steps of a bed of grains",
-                scene.half_width(d),
-                scene.half_width(d) / d,
-                why(scene.zones.half_width),
-                scene.zone_depth(d),
-                scene.zone_depth(d) / d,
-                why(scene.zones.depth),
-                100.0 * self.expected_shares()[0]
-            ),
-        ));
-        let valid = self.law(DENSE).map_or(f64::INFINITY, |(_, valid)| valid);
-        if let Some(growth) = scene.growth(d, &s, valid) {
-            let travel = &growth.travel;
-            let most = match scene.zones.budget {
-                Some(most) => format!(
-                    "to no more than {most} stored grains and the ball (zones.budget; packings may bring a few per cent more)"
-                ),
-                None => "as far as the container reaches (zones.budget left out)".into(),
-            };
-            lines.push((
-                "box".into(),
-                format!(
-                    "moves by {:.4} m: a side goes outwards where the ball is nearer than {:.4} m (zones.near_diameters {}) to the inner end of its \
-                     overlap, or grains beside that are faster than {:.3e} m/s (zones.wake_speed_scaled), {most}; inwards where they have been slower \
-                     than {:.3e} m/s (zones.rest_speed_scaled) for {:.3e} s (zones.hold_scaled); predicted, if it comes to be as deep as a box that \
-                     stays: {:.0} % of the grain-steps of a bed of grains in the end",
-                    s.buffer,
-                    growth.near,
-                    why(scene.zones.near_diameters),
-                    travel.wake,
-                    travel.rest,
-                    travel.hold,
-                    100.0 * self.expected_shares()[1]
-                ),
-            ));
-            lines.push(("strips".into(), self.strips(&growth)));
-        }
-        lines.push((
-            "overlap".into(),
-            format!(
-                "from the box's sides inwards: {}, sideways pressure at rest forgotten in a strain of {}",
-                overlap_words(&s, d),
-                s.rest_strain
-            ),
-        ));
-        let law = scene.continuum.calibrated.word().unwrap_or("none");
-        lines.push((
-            "continuum".into(),
-            format!(
-                "in space, the law calibrated for `{law}` (|τ|/p), cells of about {:.1} d",
-                scene.zones.cell_diameters
-            ),
-        ));
-        lines
+        self.plan_lines()
     }
 
     fn steer_every(&self, timestep: f64) -> u64 {
@@ -437,7 +339,7 @@ impl Recipe for JoinedBed<'_> {
                 ran.simulation.time(),
                 match self.scene.zones.moving {
                     true => "The box could not grow as fast as needed: see the moves that were refused, and zones.near_diameters.",
-                    false => "zones.depth or zones.half_width is too small for it; zones.moving = true lets the box grow.",
+                    false => "zones.depth or zones.half_width (or zones.x, zones.y) is too small for it; zones.moving = true lets the box grow.",
                 }
             ));
         }
@@ -450,152 +352,5 @@ impl Recipe for JoinedBed<'_> {
                 .map(String::as_str),
         );
         Ok(tables)
-    }
-}
-
-impl JoinedBed<'_> {
-    /// Cost, mass and momentum.
-    fn book(&self, ran: &mut Ran, bowl: &Bowl, summary: &mut Summary) {
-        let steps = ran.simulation.steps_done();
-        let before = ran.packing.grains.len() + 1;
-        let monitors = bowl.monitors();
-        let counted = summary.cost.grain_steps.min(steps * before as u64);
-        summary.cost.grain_steps += monitors.grain_steps as u64;
-        summary.cost.grain_steps -= counted;
-        summary.cost.cell_steps = monitors.steps[1] as u64;
-        if summary.cost.wall_s > 0.0 {
-            summary.cost.grain_steps_per_s = summary.cost.grain_steps as f64 / summary.cost.wall_s;
-            summary.cost.cell_steps_per_s = monitors.steps[1] / summary.cost.wall_s;
-        }
-        summary.model.grains = ran.simulation.grain_count() as u64;
-        summary.model.cells = bowl.cells().count() as u64;
-        let one = |value: f64| Quantity::new(value, "1");
-        let share = monitors.grain_steps / (steps * before as u64) as f64;
-        summary.put(
-            "grain_steps_share",
-            one(share).from("grain-steps of the run over those of the whole bed"),
-        );
-        let account = bowl.account(&ran.simulation);
-        let grains = account.grains_error(bowl.grain_momentum(&mut ran.simulation));
-        let exchange = account.exchange_error(bowl.owed(&ran.simulation));
-        summary.ledger.mass_relative = bowl.volume_error();
-        summary.ledger.momentum_relative = Some(grains.max(exchange));
-        for (name, value, source) in [
-            (
-                "handshake_mass",
-                bowl.mass_error(&ran.simulation),
-                "mass of grains and continuum on their sides of the handshake surface over that of the bed, less 1",
-            ),
-            (
-                "ledger_grains",
-                grains,
-                "momentum of grains and ball against its account, relative to the largest entry",
-            ),
-            (
-                "ledger_exchange",
-                exchange,
-                "what the relaxation gave to both sides, relative to the largest entry",
-            ),
-        ] {
-            summary.put(name, one(value).against(0.0, source));
-        }
-        for (name, impulse, source) in [
-            ("weight", account.weight, "of grains and ball"),
-            (
-                "traction",
-                account.traction,
-                "of the continuum on the grains",
-            ),
-            ("impedance", account.impedance, "on the grains"),
-            (
-                "relaxation",
-                account.relaxation,
-                "on the grains; the continuum takes the opposite",
-            ),
-        ] {
-            let name = format!("impulse_{name}_z");
-            summary.put(&name, Quantity::new(impulse.z, "N s").from(source));
-        }
-    }
-
-    /// What the monitors say, and in words what they should not.
-    fn watch(&self, bowl: &Bowl, summary: &mut Summary) {
-        let monitors = bowl.monitors();
-        let d = bowl.spec().law.diameter;
-        let slip = monitors.mean_slip() / self.scene.speed;
-        let ratio = monitors.force_ratio();
-        for (name, value, right, source) in [
-            (
-                "slip",
-                slip,
-                0.0,
-                "rms difference of mean velocities at the handshake surface over the ball's speed, mean in time; to be below 1 %",
-            ),
-            (
-                "largest_slip",
-                monitors.largest_slip / self.scene.speed,
-                0.0,
-                "the same, at its largest",
-            ),
-            (
-                "force_ratio",
-                ratio,
-                1.0,
-                "of normal forces through the handshake surface, grains over continuum, means in time; to be within 5 %",
-            ),
-            (
-                "rest_ratio",
-                bowl.rest_ratio(),
-                1.0,
-                "K_0: horizontal over vertical stress of the grains when the box was cut, which the continuum remembers until it is sheared",
-            ),
-            (
-                "relaxation_share",
-                monitors.relaxation_share(),
-                0.0,
-                "impulse of the relaxation over that of the traction",
-            ),
-            (
-                "grains_escaped",
-                monitors.escaped,
-                0.0,
-                "most grains beyond the box by more than a diameter, at any exchange",
-            ),
-            (
-                "box_moved",
-                bowl.farthest_moved() / d,
-                0.0,
-                "farthest mean way of grains through a face of the box, outwards, in diameters: it should be small",
-            ),
-        ] {
-            summary.put(name, Quantity::new(value, "1").against(right, source));
-        }
-        summary.put(
-            "newton_iterations",
-            Quantity::new(monitors.iterations / monitors.steps[0], "1")
-                .from("of the continuum, a step"),
-        );
-        summary.put(
-            "momentum_residual",
-            Quantity::new(monitors.residual, "1").from("of the continuum, largest of any step"),
-        );
-        let misses = [
-            (slip > MOST_SLIP, "the slip", slip),
-            (
-                (ratio - 1.0).abs() > MOST_RATIO,
-                "the ratio of forces",
-                ratio,
-            ),
-            (
-                monitors.escaped > 0.0,
-                "the number of grains beyond the box",
-                monitors.escaped,
-            ),
-        ];
-        for (_, what, value) in misses.into_iter().filter(|(misses, ..)| *misses) {
-            summary
-                .remarks
-                .push(format!("Overlap: {what} is {value:.4}, outside its limit."));
-        }
     }
 }

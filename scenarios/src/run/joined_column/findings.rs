@@ -2,8 +2,8 @@
 
 use super::JoinedColumn;
 use crate::failure::Failure;
-use crate::run::column_of_grains::{FLOOR, STILL_LOOKS};
-use crate::run::heap::edge;
+use crate::run::column_of_grains::{FLOOR, FRONT_SHARE, OF_SHARE, STILL_LOOKS};
+use crate::run::heap::{edge, place_of_share};
 use crate::run::land::Land;
 use crate::run::world::Ran;
 use crate::scene::{ColumnFloorKind, DENSE, overlap_words};
@@ -58,7 +58,11 @@ impl JoinedColumn<'_> {
         if let Ok(s) = scene.overlap_settings(&self.origin) {
             lines.push((
                 "overlap".into(),
-                format!("from the edge into the grains: {}", overlap_words(&s, d)),
+                format!(
+                    "from the edge into the grains: {}, sideways pressure at rest forgotten in a strain of {}",
+                    overlap_words(&s, d),
+                    s.rest_strain
+                ),
             ));
         }
         let law = match scene.grains.calibrated.word() {
@@ -100,9 +104,13 @@ impl JoinedColumn<'_> {
         let half = |upper: bool| {
             let across = |y: f64| (y.rem_euclid(scene.slab()) > 0.5 * scene.slab()) == upper;
             let heights = self.heights(&ran.simulation, &live, 0.5, across);
-            edge(&places, &heights, scene.threshold())
+            [
+                edge(&places, &heights, scene.threshold()),
+                place_of_share(&places, &heights, FRONT_SHARE),
+            ]
         };
-        let error = 0.5 * (half(true) - half(false)).abs();
+        let [upper, lower] = [half(true), half(false)];
+        let [error, error_of_share] = [0, 1].map(|k| 0.5 * (upper[k] - lower[k]).abs());
         let width = scene.width();
         let highest = deposit.iter().copied().fold(0.0, f64::max);
         let rests = live.course.resting >= STILL_LOOKS;
@@ -123,6 +131,11 @@ impl JoinedColumn<'_> {
                 "runout_scaled",
                 one((front - width) / width).with_error(error / width),
                 "(x_front − width)/width",
+            ),
+            (
+                "x_of_share",
+                m(place_of_share(&places, &deposit, FRONT_SHARE)).with_error(error_of_share),
+                OF_SHARE,
             ),
             ("deposit_height", m(highest), "greatest height at the end"),
             (
@@ -297,7 +310,7 @@ impl JoinedColumn<'_> {
                 "force_ratio",
                 ratio,
                 1.0,
-                "of forces along x through the handshake surface, contacts of grains over σ_xx of the continuum, means in time; to be within 5 %",
+                "of forces along x through the handshake surface, grains over continuum, means in time; to be within 5 %",
             ),
             (
                 "overlap_packing",
@@ -315,11 +328,31 @@ impl JoinedColumn<'_> {
                 "grains_escaped",
                 monitors.escaped,
                 0.0,
-                "most grains beyond the edge by more than a diameter, at any exchange",
+                "most grains beyond the edge by more than a diameter along its normal, at any exchange",
             ),
         ] {
             summary.put(name, Quantity::new(value, "1").against(right, source));
         }
+        let [grains, continuum] = monitors.forces();
+        for (name, value, source) in [
+            (
+                "force_of_grains",
+                grains,
+                "along x through the handshake surface, of contacts and velocity fluctuations, mean in time; over that of a run with model = \"dem\" it is what the joint does to them",
+            ),
+            (
+                "force_of_continuum",
+                continuum,
+                "the same of the continuum's stress and what it remembers of rest",
+            ),
+        ] {
+            summary.put(name, Quantity::new(value, "N").from(source));
+        }
+        summary.put(
+            "rest_ratio",
+            Quantity::new(edge.rest_ratio(), "1")
+                .from("sideways over vertical stress of the grains that became continuum, which it remembers"),
+        );
         for (name, value, source) in [
             ("continuum_steps", monitors.steps[0], "of the continuum"),
             (
@@ -358,6 +391,11 @@ impl JoinedColumn<'_> {
                 monitors.escaped,
             ),
         ];
+        let on_forces = "Overlap: below yield a continuum's sideways stress is its law's own: what the joint does to its grains is force_of_grains \
+                         over that of a run with model = \"dem\".";
+        if misses[1].0 {
+            summary.remarks.push(on_forces.into());
+        }
         for (_, what, value) in misses.into_iter().filter(|(misses, ..)| *misses) {
             summary
                 .remarks

@@ -120,10 +120,10 @@ impl Stand {
             threads,
         };
         let choice = world
-            .choose_step(&setup, recipe.step().safety)
+            .choose_step(&setup, recipe.keys().step.safety)
             .map_err(refused)?;
-        setup.timestep = match recipe.step().seconds {
-            Some(seconds) => seconds * recipe.coarse_graining() * recipe.step().safety,
+        setup.timestep = match recipe.keys().step.seconds {
+            Some(seconds) => seconds * recipe.keys().coarse_graining * recipe.keys().step.safety,
             None => choice.seconds,
         };
         if !(setup.timestep.is_finite() && setup.timestep > 0.0) {

@@ -61,7 +61,7 @@ pub fn check(scene: &Scene, recipe: &dyn Recipe) -> Result<(), Failure> {
     let packing = found.map_or_else(|| trial(&materials), |stored| stored.packing);
     let stand = Stand::new(recipe, &packing, &materials, Threads::Serial, origin)?;
     // Lengths and cells depend on the grains, which are not there yet; keys do not.
-    if let Some(average) = &recipe.output().average {
+    if let Some(average) = &recipe.keys().output.average {
         average.choice(Place {
             origin,
             section: "output.average",
@@ -133,8 +133,8 @@ fn make(recipe: &dyn Recipe, materials: &Materials, under: &Under) -> Result<Sto
         }
         ControlFlow::Continue(())
     };
-    let seed = recipe.seed();
-    let keys = (seed, recipe.step().preparation);
+    let seed = recipe.keys().seed;
+    let keys = (seed, recipe.keys().step.preparation);
     let threads = under.threads_of_one_run();
     let shop = Workshop::new(materials, keys, threads, &mut watch);
     let mut shop = shop.tell(&under.directory.journal);
@@ -184,7 +184,7 @@ pub fn run(recipe: &dyn Recipe, under: &mut Under) -> Result<Findings, Failure> 
             if !stand.world.bodies.is_empty() {
                 stand.check_room(&mut simulation, &origin)?;
             }
-            if recipe.output().ledger {
+            if recipe.keys().output.ledger {
                 simulation.open_energy_ledger();
             }
             simulation
@@ -233,7 +233,7 @@ pub fn run(recipe: &dyn Recipe, under: &mut Under) -> Result<Findings, Failure> 
         None => Vec::new(),
     };
     let mut found = findings(recipe, (&stored, &mut ran), &pictures, under)?;
-    let frames = recipe.output().frames as usize;
+    let frames = recipe.keys().output.frames as usize;
     render_own(under.directory.path(), frames, &mut found.summary)?;
     found.tables.extend(fields);
     Ok(found)
@@ -281,12 +281,12 @@ fn follow(run: Followed, under: &mut Under) -> Result<(), Failure> {
         pictures,
     } = run;
     let steps = stand.steps;
-    let row_every = (steps / recipe.output().rows).max(1);
+    let row_every = (steps / recipe.keys().output.rows).max(1);
     let steer_every = recipe.steer_every(stand.setup.timestep).max(1);
     let bar = Bar::new(&under.scene.name);
     let mut seen = Snapshot::default();
     let world = &stand.world;
-    let frames = Frames::new(under.directory.path(), steps, recipe.output().frames)
+    let frames = Frames::new(under.directory.path(), steps, recipe.keys().output.frames)
         .with_rigid(!world.bodies.is_empty(), !world.clumps.is_empty())
         .with_continuum(recipe.has_continuum());
     // Both sides of an instant, the grains last: who looks for a frame looks for theirs.
@@ -301,7 +301,7 @@ fn follow(run: Followed, under: &mut Under) -> Result<(), Failure> {
     };
     let mut course = Course::On;
     if simulation.steps_done() == 0 {
-        if recipe.output().frames > 0 {
+        if recipe.keys().output.frames > 0 {
             write_walls(stand, under)?;
         }
         course = recipe.steer(simulation, state)?;
@@ -383,7 +383,7 @@ fn findings(
         grains,
         cells: 0,
         dt_s: taken,
-        dt_limit: match recipe.step().seconds {
+        dt_limit: match recipe.keys().step.seconds {
             Some(_) => step::given(taken, choice),
             None => step::chosen(choice),
         },
@@ -448,7 +448,7 @@ fn findings(
 
 /// What the scene leaves out: its own, and what its law and its world do not have.
 pub fn left_out(recipe: &dyn Recipe, stand: &Stand) -> Vec<String> {
-    let mut own = bed::left_out(recipe.contact().parts(), &recipe.left_out());
+    let mut own = bed::left_out(recipe.keys().contact.parts(), &recipe.left_out());
     if stand.world.bonds.is_empty() {
         own.push("bonds".into());
     }

@@ -87,7 +87,7 @@ pub struct History {
 impl History {
     /// No rows yet.
     pub fn new(stand: &Stand, recipe: &dyn Recipe) -> History {
-        let (world, ledger) = (&stand.world, recipe.output().ledger);
+        let (world, ledger) = (&stand.world, recipe.keys().output.ledger);
         let named = |list: &[(&str, &'static str)]| -> Vec<(String, &'static str)> {
             list.iter().map(|(n, u)| ((*n).to_owned(), *u)).collect()
         };

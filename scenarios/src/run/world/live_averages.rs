@@ -40,7 +40,7 @@ impl LiveAverages {
         stand: &Stand,
         origin: &str,
     ) -> Result<Option<LiveAverages>, Failure> {
-        let Some(keys) = &recipe.output().average else {
+        let Some(keys) = &recipe.keys().output.average else {
             return Ok(None);
         };
         let place = Place {

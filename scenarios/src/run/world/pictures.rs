@@ -85,7 +85,7 @@ impl<'a> Pictures<'a> {
         Pictures {
             view: recipe.view(),
             kinds: &materials.names,
-            between: recipe.output().pictures,
+            between: recipe.keys().output.pictures,
             bodies,
             directory,
         }

@@ -35,6 +35,23 @@ pub enum Course {
     Over,
 }
 
+/// Keys that every scene of grains has.
+#[derive(Clone, Copy, Debug)]
+pub struct RecipeKeys<'a> {
+    /// The contact law's.
+    pub contact: &'a LawKeys,
+    /// Seed of all random numbers.
+    pub seed: u64,
+    /// Size of the computed parcels over that of the grains.
+    pub coarse_graining: f64,
+    /// The time step's.
+    pub step: &'a StepKeys,
+    /// The output's.
+    pub output: &'a OutputKeys,
+    /// Name or file of a packing to start from.
+    pub packing: Option<&'a str>,
+}
+
 /// A scene of grains, in what it does. All methods are told the scene file for their messages.
 pub trait Recipe: Debug + Sync {
     /// What the scene is, in a sentence.
@@ -43,23 +60,8 @@ pub trait Recipe: Debug + Sync {
     /// What grains and walls are made of.
     fn materials(&self, origin: &str) -> Result<Materials, Failure>;
 
-    /// The keys of the contact law.
-    fn contact(&self) -> &LawKeys;
-
-    /// Seed of all random numbers.
-    fn seed(&self) -> u64;
-
-    /// Size of the computed parcels over that of the grains.
-    fn coarse_graining(&self) -> f64;
-
-    /// The time step's keys.
-    fn step(&self) -> &StepKeys;
-
-    /// The output's keys.
-    fn output(&self) -> &OutputKeys;
-
-    /// Name or file of a packing to start from.
-    fn packing(&self) -> Option<&str>;
+    /// The keys that every such scene has.
+    fn keys(&self) -> RecipeKeys<'_>;
 
     /// What the preparation goes by: a packing that was made by anything else is refused. None where the
     /// scene has no preparation of its own.
@@ -165,28 +167,8 @@ macro_rules! as_the_scene {
             $crate::run::world::Recipe::materials(self.scene, origin)
         }
 
-        fn contact(&self) -> &$crate::scene::LawKeys {
-            self.scene.contact()
-        }
-
-        fn seed(&self) -> u64 {
-            $crate::run::world::Recipe::seed(self.scene)
-        }
-
-        fn coarse_graining(&self) -> f64 {
-            self.scene.coarse_graining()
-        }
-
-        fn step(&self) -> &$crate::scene::world::StepKeys {
-            self.scene.step()
-        }
-
-        fn output(&self) -> &$crate::scene::world::OutputKeys {
-            self.scene.output()
-        }
-
-        fn packing(&self) -> Option<&str> {
-            self.scene.packing()
+        fn keys(&self) -> $crate::run::world::RecipeKeys<'_> {
+            self.scene.keys()
         }
 
         fn provenance(&self) -> Option<toml::Table> {

@@ -29,7 +29,7 @@ pub fn find(
     materials: &Materials,
     origin: &str,
 ) -> Result<Option<Stored>, Failure> {
-    let Some(named) = recipe.packing() else {
+    let Some(named) = recipe.keys().packing else {
         return Ok(None);
     };
     let plain = |c: char| c.is_alphanumeric() || "-_.".contains(c);
@@ -78,7 +78,11 @@ fn mismatch(recipe: &dyn Recipe, materials: &Materials, stored: &Stored) -> Opti
 
 /// Keeps a packing under the name that its scene gives it, if it gives one.
 pub fn keep(recipe: &dyn Recipe, scene: &str, stored: &Stored) -> Result<Option<PathBuf>, Failure> {
-    let Some(named) = recipe.packing().filter(|named| !named.ends_with(".h5")) else {
+    let Some(named) = recipe
+        .keys()
+        .packing
+        .filter(|named| !named.ends_with(".h5"))
+    else {
         return Ok(None);
     };
     let path = place(named);
