@@ -249,10 +249,10 @@ fn low_heap_has_no_steps() {
     assert!(steps < 0.012 && difference < 0.01, "{steps} {difference}");
 }
 
-/// Profiles at t = 6 on three grids come closer by order 1.8 and 1.3 at a = 0.5 and 1.42. At a = 6.26, where
-/// the heap is a few cells thick, the order is 1.3 at t = 3; from then on the tip of the toe, thinner than a grain and than a
-/// cell, still creeps farther on finer grids, and at rest profiles differ by 0.72 and 0.69 % of the area: no order
-/// is asked of them there, but of the centre of mass (1.7). Basilisk at a = 1.42: 4.6e-2 between 128 and 256 cells, 4.9e-2 between 256 and 512.
+/// Profiles at t = 6 on three grids come closer by order 1.7 and 1.4 at a = 0.5 and 1.42. At a = 6.26, where
+/// the heap is a few cells thick, the order is 1.2 at t = 3; from then on the tip of the toe, thinner than a grain and than a
+/// cell, still creeps farther on finer grids, and at rest profiles differ by 0.92 and 0.79 % of the area: no order
+/// is asked of them there, but of the centre of mass (3.5). Basilisk at a = 1.42: 4.6e-2 between 128 and 256 cells, 4.9e-2 between 256 and 512.
 #[test]
 #[ignore = "long: run by tests/validate.sh"]
 fn deposits_converge_with_the_grid() {
