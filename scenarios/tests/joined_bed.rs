@@ -251,6 +251,9 @@ fn a_ball_that_comes_to_the_overlap_ends_the_run_or_lets_the_box_grow() {
     assert_eq!(rows.len() as f64, value(&grown, "moves"));
 }
 
+/// The last value of a key holds.
+const WITHOUT_A_SIDE: [&str; 3] = ["zones.x=[-1,1]", "zones.half_width=0.0165", "zones.depth=1"];
+
 #[test]
 fn bad_joined_beds_are_refused_by_key() {
     let folder = tempfile::tempdir().unwrap();
@@ -263,6 +266,8 @@ fn bad_joined_beds_are_refused_by_key() {
             "zones.x[1]",
             "at or beyond 0.0105",
         ),
+        // From wall to wall and down to the floor there is no continuum.
+        (&WITHOUT_A_SIDE, "zones.depth", "some continuum is left"),
         (
             &["zones.x=[-0.012,0.012]", "zones.y=[-1,1]"],
             "zones.half_width",

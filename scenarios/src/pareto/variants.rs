@@ -3,6 +3,11 @@
 use crate::failure::Failure;
 use crate::scene::Scene;
 
+/// Most runs of a comparison.
+const MOST_RUNS: usize = 1000;
+/// Longest name of a run's folder (bytes), which file systems take.
+const LONGEST_NAME: usize = 200;
+
 /// A key and its values, as written.
 pub type Varied = (String, Vec<String>);
 
@@ -45,6 +50,14 @@ pub fn parse(vary: &[String]) -> Result<Vec<Varied>, Failure> {
 /// A scene for each combination, the last key's values changing first.
 pub fn variants(scene: &Scene, varied: &[Varied]) -> Result<Vec<Variant>, Failure> {
     let keys: Vec<String> = varied.iter().map(|(key, _)| key.clone()).collect();
+    let counts = varied.iter().map(|(_, values)| values.len());
+    let runs = counts.fold(1_usize, usize::saturating_mul);
+    if runs > MOST_RUNS {
+        return Err(Failure::Input(format!(
+            "--vary {}: {runs} runs; allowed: at most {MOST_RUNS}",
+            keys.join(", ")
+        )));
+    }
     let mut rows: Vec<Vec<String>> = vec![Vec::new()];
     for (_, values) in varied {
         let longer = rows.iter().flat_map(|row| {
@@ -64,6 +77,14 @@ pub fn variants(scene: &Scene, varied: &[Varied]) -> Result<Vec<Variant>, Failur
             scene: scene.with(&sets, "--vary")?,
             values,
         };
+        if variant.folder.len() > LONGEST_NAME {
+            return Err(Failure::Input(format!(
+                "--vary {}: the name of a run, {}, has {} bytes; allowed: at most {LONGEST_NAME}",
+                keys.join(", "),
+                variant.folder,
+                variant.folder.len()
+            )));
+        }
         let twin = all
             .iter()
             .find(|other| other.folder == variant.folder || other.scene == variant.scene);
@@ -104,6 +125,20 @@ fn folder_name(key: &str, value: &str) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn too_many_runs_and_too_long_names_are_refused() {
+        let scene = Scene::load("bagnold", &[]).unwrap();
+        let many: Vec<String> = (1..=40).map(|n| n.to_string()).collect();
+        let varied = |key: &str| (key.to_owned(), many.clone());
+        let said = |varied: &[Varied]| format!("{:?}", variants(&scene, varied).unwrap_err());
+        let runs = said(&[varied("grid.cells"), varied("grid.columns")]);
+        assert!(runs.contains("1600 runs"), "{runs}");
+        let long = format!("1.{}", "0".repeat(300));
+        let values = vec![long, "2.0".to_owned()];
+        let name = said(&[("depth".to_owned(), values)]);
+        assert!(name.contains("at most 200"), "{name}");
+    }
 
     #[test]
     fn keys_that_vary_are_read_and_refused() {

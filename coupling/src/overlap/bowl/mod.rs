@@ -122,7 +122,7 @@ impl BowlSpec {
     /// Whether a box, its overlap and some continuum around it have room in a bed of this height (m).
     ///
     /// # Errors
-    /// [`OverlapError::OutOfRange`] with `x`, `y` (the upper edge along it) or `bottom`.
+    /// [`OverlapError::OutOfRange`] with `x`, `y` (the box's extent along it, m), `bottom` or `sides` (their number).
     pub fn check(&self, height: f64) -> Result<(), OverlapError> {
         self.layout(height).map(drop)
     }
@@ -159,14 +159,15 @@ impl BowlSpec {
                 y.saturating_sub(margins[1][1]),
             ],
         );
-        let [x, y] = self.edges.map(|[_, high]| high);
+        let [x, y] = self.edges.map(|[low, high]| high - low);
         for (axis, key, value) in [(0, "x", x), (1, "y", y), (2, "bottom", self.bottom)] {
             let allowed = "such that a cell of grains is left beyond the overlap";
             let left = zone.inside(axis, filled, widths[1]);
             check(key, value, left >= 1.0, allowed)?;
         }
         let allowed = "such that some continuum is left around the grains";
-        check("x", x, !zone.sides.is_empty(), allowed)?;
+        let sides = zone.sides.len();
+        check("sides", sides as f64, sides > 0, allowed)?;
         Ok(Layout {
             cells,
             zone,

@@ -58,9 +58,17 @@ impl JoinedBed<'_> {
                 let scale = self.scene.scale;
                 let floor = self.scene.container.floor;
                 let (key, value) = match key {
-                    "x" if self.scene.zones.x.is_some() => ("zones.x[1]", value / scale),
-                    "y" if self.scene.zones.y.is_some() => ("zones.y[1]", value / scale),
-                    "x" | "y" => ("zones.half_width", value / scale),
+                    "x" if self.scene.zones.x.is_some() => {
+                        ("zones.x, from edge to edge", value / scale)
+                    }
+                    "y" if self.scene.zones.y.is_some() => {
+                        ("zones.y, from edge to edge", value / scale)
+                    }
+                    "x" | "y" => ("zones.half_width", 0.5 * value / scale),
+                    "sides" => (
+                        "zones.depth with zones.half_width, zones.x, zones.y: sides of the box",
+                        value,
+                    ),
                     "bottom" => ("zones.depth, whose bottom lies at z", floor + value / scale),
                     _ => (key, value),
                 };
