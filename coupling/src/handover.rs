@@ -11,11 +11,15 @@
 //! filled until the area is `Σ V_i/(φ_s w)`, so the volume is exact and the outline is a level of φ. Velocities are the
 //! grains' means, `u = Σ m_i v_i W/Σ m_i W`, and all of them are moved by one small velocity that makes the momentum that of
 //! the grains. What is lost is what a continuum cannot hold: agitation about the mean and spin; it is reported.
+//!
+//! Debris may come in instalments: what comes later fills what matter and ground leave free ([`Debris::join`]).
 
 use colluvium_continuum::column_collapse::{Collapse, Matter};
 use colluvium_continuum::rheology::ShearLaw;
 use colluvium_continuum::terrain::Profile;
 use colluvium_dem::Grain;
+
+mod joining;
 
 /// Parts of a cell's edge on which φ is looked at.
 const PARTS: usize = 4;
@@ -83,14 +87,14 @@ impl<'a> Room<'a> {
     }
 
     /// Faces of a component: one more than cells along it.
-    fn faces(&self, component: usize) -> [usize; 2] {
+    pub(crate) fn faces(&self, component: usize) -> [usize; 2] {
         let mut faces = self.counts;
         faces[component] += 1;
         faces
     }
 
     /// Middle of a face (m).
-    fn face(&self, component: usize, index: [usize; 2]) -> [f64; 2] {
+    pub(crate) fn face(&self, component: usize, index: [usize; 2]) -> [f64; 2] {
         std::array::from_fn(|a| {
             let within = if a == component { 0.0 } else { 0.5 };
             self.origin[a] + (index[a] as f64 + within) * self.spacing
@@ -117,6 +121,8 @@ pub struct Debris<'a> {
     pub grains: &'a [Grain],
     /// Solid fraction of the continuum.
     pub solid_fraction: f64,
+    /// Density of its grains (kg/m³).
+    pub grain_density: f64,
     /// Width of the slab (m).
     pub width: f64,
     /// Reach c of the smoothing (m).
@@ -126,6 +132,10 @@ pub struct Debris<'a> {
 /// How a hand-over went; SI units.
 #[derive(Clone, Copy, Debug, PartialEq, Default)]
 pub struct Handed {
+    /// How many grains.
+    pub grains: usize,
+    /// Their mass (kg).
+    pub mass: f64,
     /// Volume of the grains over φ_s, and that of the continuum (m³).
     pub volume: [f64; 2],
     /// Momentum along x and z of the grains, and of the continuum (kg m/s).
@@ -138,13 +148,13 @@ pub struct Handed {
 }
 
 /// (1 − r²/c²)² within its reach.
-fn kernel(square: f64, reach: f64) -> f64 {
+pub(crate) fn kernel(square: f64, reach: f64) -> f64 {
     let q = 1.0 - square / (reach * reach);
     if q > 0.0 { q * q } else { 0.0 }
 }
 
 /// Numbers of the fine cells along an axis whose middles lie within a reach of a place.
-fn around(
+pub(crate) fn around(
     place: f64,
     reach: f64,
     origin: f64,
@@ -164,9 +174,13 @@ impl Debris<'_> {
         if self.grains.is_empty() {
             return Err(HandoverError::Nothing);
         }
-        let volume: f64 = self.grains.iter().map(Grain::volume).sum();
-        let needed = volume / (self.solid_fraction * self.width);
-        let fractions = self.fill(room, needed)?;
+        let nothing = vec![0.0; room.free.len()];
+        let (fractions, left) = self.fill(room, &nothing, self.area(), self.reach);
+        if left > 0.0 {
+            let needed = self.area();
+            let found = needed - left;
+            return Err(HandoverError::NoRoom { needed, found });
+        }
         let mut velocity = [0, 1].map(|c| self.means(room, c, &fractions));
         let handed = self.settle(room, &fractions, &mut velocity);
         Ok((
@@ -178,8 +192,15 @@ impl Debris<'_> {
         ))
     }
 
-    /// Fills the places of largest smoothed solid fraction until the area (m²) is there.
-    fn fill(&self, room: &Room, needed: f64) -> Result<Vec<f64>, HandoverError> {
+    /// Area that the debris takes in section (m²).
+    fn area(&self) -> f64 {
+        let volume: f64 = self.grains.iter().map(Grain::volume).sum();
+        volume / (self.solid_fraction * self.width)
+    }
+
+    /// Fills the places of largest smoothed solid fraction, beside the parts of cells that are taken, until the area (m²) is
+    /// there; says what is filled and what area is left over.
+    fn fill(&self, room: &Room, taken: &[f64], needed: f64, reach: f64) -> (Vec<f64>, f64) {
         let h = room.spacing / PARTS as f64;
         let [columns, rows] = room.counts.map(|n| n * PARTS);
         let place = |i: usize, a: usize| room.origin[a] + (i as f64 + 0.5) * h;
@@ -191,21 +212,21 @@ impl Debris<'_> {
                     .ground
                     .height_at(place(i, 0))
                     .is_none_or(|z| place(k, 1) > z);
-                above && room.free[cell_of(i, k)] > CLOSED
+                above && room.free[cell_of(i, k)] - taken[cell_of(i, k)] > CLOSED
             })
             .collect();
         let mut dense = vec![0.0; rows * columns];
-        let near = |x: f64, a: usize| around(x, self.reach, room.origin[a], h, [columns, rows][a]);
+        let near = |x: f64, a: usize| around(x, reach, room.origin[a], h, [columns, rows][a]);
         for grain in self.grains {
             let [x, z] = [grain.position.x, grain.position.z];
             for k in near(z, 1) {
                 for i in near(x, 0) {
                     let square = (place(i, 0) - x).powi(2) + (place(k, 1) - z).powi(2);
-                    dense[i + columns * k] += grain.volume() * kernel(square, self.reach);
+                    dense[i + columns * k] += grain.volume() * kernel(square, reach);
                 }
             }
         }
-        // Over what the ground leaves free of the kernel.
+        // Over what ground and matter leave free of the kernel.
         let mut candidates: Vec<(f64, usize)> = Vec::new();
         for at in (0..dense.len()).filter(|&at| dense[at] > 0.0 && is_free[at]) {
             let [x, z] = [place(at % columns, 0), place(at / columns, 1)];
@@ -214,7 +235,9 @@ impl Debris<'_> {
                 for i in near(x, 0) {
                     if is_free[i + columns * k] {
                         let square = (place(i, 0) - x).powi(2) + (place(k, 1) - z).powi(2);
-                        whole += kernel(square, self.reach);
+                        let cell = cell_of(i, k);
+                        let open = 1.0 - taken[cell] / room.free[cell];
+                        whole += open * kernel(square, reach);
                     }
                 }
             }
@@ -229,18 +252,14 @@ impl Debris<'_> {
         let mut left = needed / (room.spacing * room.spacing);
         for (_, at) in candidates {
             let cell = cell_of(at % columns, at / columns);
-            let part = room.free[cell] / parts[cell] as f64;
+            let part = (room.free[cell] - taken[cell]) / parts[cell] as f64;
             fractions[cell] += part.min(left);
             left -= part.min(left);
             if left <= 0.0 {
                 break;
             }
         }
-        if left > 0.0 {
-            let found = needed - left * room.spacing * room.spacing;
-            return Err(HandoverError::NoRoom { needed, found });
-        }
-        Ok(fractions)
+        (fractions, left.max(0.0) * room.spacing * room.spacing)
     }
 
     /// Mean velocity of the grains about each face of a component that matter touches; none at the edge and at closed cells.
@@ -279,13 +298,18 @@ impl Debris<'_> {
             .collect()
     }
 
+    /// Mass of a whole cell of the continuum (kg).
+    fn cell_mass(&self, room: &Room) -> f64 {
+        self.grain_density * self.solid_fraction * room.spacing * room.spacing * self.width
+    }
+
     /// Makes the momentum that of the grains, and says how the hand-over went.
     fn settle(&self, room: &Room, fractions: &[f64], velocity: &mut [Vec<f64>; 2]) -> Handed {
-        let mass: f64 = self.grains.iter().map(Grain::mass).sum();
         let area: f64 = fractions.iter().sum();
-        // Of a whole cell.
-        let unit = mass / area;
+        let unit = self.cell_mass(room);
         let mut handed = Handed {
+            grains: self.grains.len(),
+            mass: self.grains.iter().map(Grain::mass).sum(),
             volume: [
                 self.grains.iter().map(Grain::volume).sum::<f64>() / self.solid_fraction,
                 area * room.spacing * room.spacing * self.width,
@@ -328,7 +352,7 @@ impl Debris<'_> {
 
 impl Room<'_> {
     /// Matter that a face carries, in whole cells: half of that of its two cells; none at the edge and beside closed cells.
-    fn carried(&self, component: usize, face: usize, fractions: &[f64]) -> f64 {
+    pub(crate) fn carried(&self, component: usize, face: usize, fractions: &[f64]) -> f64 {
         let along = self.faces(component)[0];
         match self.cells_of(component, [face % along, face / along]) {
             [Some(low), Some(high)] if self.free[low] > CLOSED && self.free[high] > CLOSED => {
@@ -346,7 +370,7 @@ mod tests {
     use nalgebra::Vector3;
 
     /// A lattice of grains over level ground, moving as a field says.
-    fn lattice(columns: usize, rows: usize, field: impl Fn(f64, f64) -> [f64; 2]) -> Vec<Grain> {
+    pub(super) fn lattice(columns: usize, rows: usize, field: impl Fn(f64, f64) -> [f64; 2]) -> Vec<Grain> {
         let mut grains = Vec::new();
         for k in 0..rows {
             for j in 0..4 {
@@ -363,12 +387,12 @@ mod tests {
         grains
     }
 
-    fn level() -> Profile {
+    pub(super) fn level() -> Profile {
         Profile::new(vec![[-1.0, 0.0], [100.0, 0.0]]).unwrap()
     }
 
     /// Cells of edge 0.8 from below the ground at z = −0.8 on.
-    fn room(ground: &Profile) -> Room<'_> {
+    pub(super) fn room(ground: &Profile) -> Room<'_> {
         let counts = [30, 20];
         Room {
             origin: [0.0, -0.8],
@@ -379,10 +403,11 @@ mod tests {
         }
     }
 
-    fn debris(grains: &[Grain]) -> Debris<'_> {
+    pub(super) fn debris(grains: &[Grain]) -> Debris<'_> {
         Debris {
             grains,
             solid_fraction: std::f64::consts::PI / 6.0,
+            grain_density: 2.0,
             width: 4.0,
             reach: 2.0,
         }
