@@ -370,7 +370,11 @@ mod tests {
     use nalgebra::Vector3;
 
     /// A lattice of grains over level ground, moving as a field says.
-    pub(super) fn lattice(columns: usize, rows: usize, field: impl Fn(f64, f64) -> [f64; 2]) -> Vec<Grain> {
+    pub(super) fn lattice(
+        columns: usize,
+        rows: usize,
+        field: impl Fn(f64, f64) -> [f64; 2],
+    ) -> Vec<Grain> {
         let mut grains = Vec::new();
         for k in 0..rows {
             for j in 0..4 {

@@ -4,6 +4,7 @@
 pub mod calibration;
 pub mod campaign;
 pub mod coarse_graining;
+pub mod debris_ground;
 pub mod handover;
 pub mod incline;
 pub mod overlap;

@@ -25,8 +25,7 @@ impl Debris<'_> {
             return Err(HandoverError::Nothing);
         }
         let longest = room.spacing * room.counts.iter().sum::<usize>() as f64;
-        let (mut taken, mut left, mut reach) =
-            (present.fractions.clone(), self.area(), self.reach);
+        let (mut taken, mut left, mut reach) = (present.fractions.clone(), self.area(), self.reach);
         let mut added = vec![0.0; taken.len()];
         while left > 0.0 {
             if reach > 2.0 * longest {
@@ -120,7 +119,9 @@ mod tests {
     fn what_finds_no_room_goes_to_the_surface() {
         let ground = level();
         let room = room(&ground);
-        let (first, _) = debris(&lattice(20, 9, |_, _| [0.0, 0.0])).hand_over(&room).unwrap();
+        let (first, _) = debris(&lattice(20, 9, |_, _| [0.0, 0.0]))
+            .hand_over(&room)
+            .unwrap();
         let mut inside = lattice(3, 2, |_, _| [0.0, 0.0]);
         for grain in &mut inside {
             grain.position.x += 8.0;
@@ -131,7 +132,11 @@ mod tests {
         let mut above = 0.0;
         for (at, (new, old)) in both.fractions.iter().zip(&first.fractions).enumerate() {
             assert!(*new <= room.free[at] + 1e-12);
-            above += if -0.8 + 0.8 * (at / 30) as f64 > 7.0 { new - old } else { 0.0 };
+            above += if -0.8 + 0.8 * (at / 30) as f64 > 7.0 {
+                new - old
+            } else {
+                0.0
+            };
         }
         assert!(above * 0.64 > 0.8 * 6.0, "{above}");
         let tight = Room {

@@ -20,6 +20,14 @@ pub struct CliffRunoutKeys {
     /// which a continuum does not. 90: whatever stands.
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 90.0))]
     pub steepest_degrees: f64,
+    /// Where the debris as a whole stands more steeply, the part of it that lies goes by itself, in instalments of at least this
+    /// share of what stood before the crack, while the rest goes on as grains. 1: as a whole only.
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0))]
+    pub least_share: f64,
+    /// How deep a grain that fell from the cliff's height sinks into debris that is a continuum, over the mean diameter of the
+    /// parcels: the stiffness of its surface, and the time between two exchanges with grains.
+    #[schemars(extend("minimum" = 0.001, "maximum" = 0.5))]
+    pub sinking_diameters: f64,
     /// Static friction μ_s of the debris.
     #[schemars(extend("minimum" = 0.0, "maximum" = 10.0))]
     pub mu_s: f64,
@@ -51,6 +59,8 @@ impl Default for CliffRunoutKeys {
         Self {
             kinetic_share: 0.1,
             steepest_degrees: 45.0,
+            least_share: 0.1,
+            sinking_diameters: 0.05,
             mu_s: 0.6,
             mu_2: 0.9,
             i_0: 0.3,

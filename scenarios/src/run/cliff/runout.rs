@@ -8,10 +8,11 @@ use crate::run::land::Land;
 use crate::run::surface_fields::SurfaceFields;
 use crate::scene::CliffScene;
 use crate::vtkhdf::{Cells, Frame};
-use colluvium_continuum::column_collapse::{Collapse, CollapseCase, CollapseGround};
+use colluvium_continuum::column_collapse::{Collapse, CollapseCase, CollapseGround, Matter};
 use colluvium_continuum::free_surface::{CellFields, History, SurfaceOptions, SurfaceState};
 use colluvium_continuum::rheology::MuI;
 use colluvium_continuum::terrain::Profile;
+use colluvium_coupling::debris_ground::{DebrisGround, SurfaceLine};
 use colluvium_coupling::handover::{Debris, Handed, Room};
 use colluvium_dem::Grain;
 
@@ -29,19 +30,30 @@ pub struct Runout {
     pub begun: f64,
     /// Width of the slab (m).
     width: f64,
-    /// How the grains were handed over.
-    pub handed: Handed,
+    /// Time between two exchanges with grains beside it (s); 0 where it is alone.
+    interval: f64,
+    /// How grains were handed over, and when (s), instalment by instalment.
+    pub instalments: Vec<(f64, Handed)>,
     /// Steps, Newton iterations, cut steps, cell-steps.
     pub steps: [u64; 4],
 }
 
-/// Numbers in front of the state: the law's diameter, density and solid fraction, the width, the time of the hand-over, four
-/// counts of steps, and how the hand-over went.
-const HEAD: usize = 20;
+/// Numbers in front of the instalments: the law's diameter, density and solid fraction, the width, the time of the first, the time
+/// between exchanges, and four counts of steps.
+const HEAD: usize = 10;
+/// Numbers of an instalment.
+const ROW: usize = 14;
+/// Longest step beside grains over the time between exchanges: one step goes from one to the next whatever its last bits.
+const WHOLE: f64 = 1.01;
 
 impl Runout {
-    /// Ground and grid, with nothing on it yet, in a slab of a width (m).
-    fn bare(scene: &CliffScene, origin: &str, law: MuI, width: f64) -> Result<Self, Failure> {
+    /// Ground and grid, with nothing on it yet, in a slab of a width (m), with so much time between exchanges (s; 0: alone).
+    fn bare(
+        scene: &CliffScene,
+        origin: &str,
+        law: MuI,
+        [width, interval]: [f64; 2],
+    ) -> Result<Self, Failure> {
         let d = law.diameter;
         let axis = scene.heap_axis(d);
         let (low, height) = (axis.start, scene.shape.height);
@@ -62,7 +74,16 @@ impl Runout {
             length_scaled: length / height,
             overhang_degrees: 0.0,
         };
-        let options = SurfaceOptions::default();
+        // Velocities that are changed from outside have no second order.
+        let options = if interval > 0.0 {
+            SurfaceOptions {
+                second_order: false,
+                largest_step: WHOLE * interval / case.units().time(),
+                ..SurfaceOptions::default()
+            }
+        } else {
+            SurfaceOptions::default()
+        };
         let collapse = Collapse::bare(&case, &options, &ground, height).map_err(failure)?;
         Ok(Self {
             collapse,
@@ -70,39 +91,126 @@ impl Runout {
             low,
             begun: 0.0,
             width,
-            handed: Handed::default(),
+            interval,
+            instalments: Vec::new(),
             steps: [0; 4],
         })
     }
 
     /// Whether ground, grid and law fit together.
     pub fn check(scene: &CliffScene, origin: &str, law: MuI) -> Result<(), Failure> {
-        Self::bare(scene, origin, law, 1.0).map(drop)
+        Self::bare(scene, origin, law, [1.0, 0.0]).map(drop)
     }
 
-    /// Of grains, in a slab of a width (m), at a time (s).
+    /// Of grains, in a slab of a width (m), at a time (s), with so much time between exchanges (s; 0: alone).
     pub fn begin(
         scene: &CliffScene,
         origin: &str,
         law: MuI,
-        width: f64,
+        [width, interval]: [f64; 2],
         grains: &[Grain],
         time: f64,
     ) -> Result<Self, Failure> {
-        let mut runout = Self::bare(scene, origin, law, width)?;
-        let debris = Debris {
-            grains,
-            solid_fraction: law.solid_fraction,
-            width,
-            reach: scene.runout.reach_diameters * law.diameter,
-        };
-        let (matter, handed) = debris
+        let mut runout = Self::bare(scene, origin, law, [width, interval])?;
+        let reach = scene.runout.reach_diameters * law.diameter;
+        let (matter, handed) = runout
+            .debris(grains, reach)
             .hand_over(&runout.room())
             .map_err(|why| Failure::Run(why.to_string()))?;
         runout.collapse.fill(matter).map_err(failure)?;
-        runout.handed = handed;
+        runout.instalments.push((time, handed));
         runout.begun = time;
         Ok(runout)
+    }
+
+    fn debris<'a>(&self, grains: &'a [Grain], reach: f64) -> Debris<'a> {
+        let law = self.law();
+        Debris {
+            grains,
+            solid_fraction: law.solid_fraction,
+            grain_density: law.grain_density,
+            width: self.width,
+            reach,
+        }
+    }
+
+    /// Takes the next instalment at a time (s).
+    pub fn join(&mut self, scene: &CliffScene, grains: &[Grain], time: f64) -> Result<(), Failure> {
+        let reach = scene.runout.reach_diameters * self.law().diameter;
+        let state = self.collapse.flow().state();
+        let unit = self.collapse.units().velocity;
+        let present = Matter {
+            fractions: state.fractions.clone(),
+            velocity: [0, 1].map(|c| state.velocity[c].iter().map(|u| u * unit).collect()),
+        };
+        let (matter, handed) = self
+            .debris(grains, reach)
+            .join(&self.room(), &present)
+            .map_err(|why| Failure::Run(why.to_string()))?;
+        self.collapse.fill(matter).map_err(failure)?;
+        self.instalments.push((time, handed));
+        Ok(())
+    }
+
+    /// Goes on without grains beside it.
+    pub fn alone(&self, scene: &CliffScene, origin: &str) -> Result<Self, Failure> {
+        let law = *self.law();
+        let mut runout = Self::bare(scene, origin, law, [self.width, 0.0])?;
+        let state = SurfaceState {
+            history: History::default(),
+            ..self.collapse.flow().state().clone()
+        };
+        runout.collapse.set_state(state).map_err(failure)?;
+        runout.begun = self.begun;
+        runout.instalments.clone_from(&self.instalments);
+        runout.steps = self.steps;
+        Ok(runout)
+    }
+
+    /// Its surface, that rises from one before in so much time (s); at rest without one.
+    pub fn surface(&self, before: Option<(&SurfaceLine, f64)>) -> SurfaceLine {
+        SurfaceLine::of(&self.collapse, self.low, before)
+    }
+
+    /// Does something with cells, the part of each that is filled, and the mass of a whole one (kg).
+    pub fn with_cells<T>(&self, act: impl FnOnce((&Room<'_>, &[f64], f64)) -> T) -> T {
+        let fractions = &self.collapse.flow().state().fractions;
+        act((&self.room(), fractions, self.cell_mass()))
+    }
+
+    /// Takes what grains have pushed since the last exchange.
+    pub fn take(&mut self, ground: &mut DebrisGround) -> Result<(), Failure> {
+        let mut state = self.collapse.flow().state().clone();
+        let unit = self.collapse.units().velocity;
+        let SurfaceState {
+            fractions,
+            velocity: [u, w],
+            ..
+        } = &mut state;
+        for u in u.iter_mut().chain(w.iter_mut()) {
+            *u *= unit;
+        }
+        ground.deliver((&self.room(), fractions, self.cell_mass()), [u, w]);
+        for u in u.iter_mut().chain(w.iter_mut()) {
+            *u /= unit;
+        }
+        self.collapse.set_state(state).map_err(failure)
+    }
+
+    /// Mass of a whole cell (kg).
+    fn cell_mass(&self) -> f64 {
+        let law = self.law();
+        law.grain_density * law.solid_fraction * self.collapse.spacing().powi(2) * self.width
+    }
+
+    /// Edge of a cell (m).
+    pub fn spacing(&self) -> f64 {
+        self.collapse.spacing()
+    }
+
+    /// Volume that was handed over (m³).
+    fn volume(&self) -> f64 {
+        self.instalments.iter().map(|(_, h)| h.volume[1]).sum()
     }
 
     fn room(&self) -> Room<'_> {
@@ -144,7 +252,7 @@ impl Runout {
     /// Mass (kg).
     pub fn mass(&self) -> f64 {
         let law = self.law();
-        law.grain_density * law.solid_fraction * self.handed.volume[1]
+        law.grain_density * law.solid_fraction * self.volume()
     }
 
     fn law(&self) -> &MuI {
@@ -154,9 +262,7 @@ impl Runout {
     /// Kinetic energy (J).
     pub fn kinetic(&self) -> f64 {
         let state = self.collapse.flow().state();
-        let law = self.law();
-        let density = law.grain_density * law.solid_fraction;
-        let cell_mass = density * self.collapse.spacing().powi(2) * self.width;
+        let cell_mass = self.cell_mass();
         let [u, w] = &state.velocity;
         let speed = self.collapse.units().velocity;
         speed * speed * self.room().kinetic(&state.fractions, [u, w], cell_mass)
@@ -166,7 +272,7 @@ impl Runout {
     pub fn volume_drift(&self) -> f64 {
         let state = self.collapse.flow().state();
         let area = state.fractions.iter().sum::<f64>() * self.collapse.spacing().powi(2);
-        area * self.width / self.handed.volume[1] - 1.0
+        area * self.width / self.volume() - 1.0
     }
 
     /// Cells of the grid.
@@ -189,19 +295,23 @@ impl Runout {
     pub fn write(&self, memory: &mut Vec<f64>) {
         let law = self.law();
         let state = self.collapse.flow().state();
-        let h = &self.handed;
         memory.extend([
             law.diameter,
             law.grain_density,
             law.solid_fraction,
             self.width,
             self.begun,
+            self.interval,
         ]);
         memory.extend(self.steps.map(|n| n as f64));
-        memory.extend(h.volume);
-        memory.extend(h.momentum.as_flattened());
-        memory.extend(h.kinetic);
-        memory.extend(h.moved);
+        memory.push(self.instalments.len() as f64);
+        for (time, h) in &self.instalments {
+            memory.extend([*time, h.grains as f64, h.mass]);
+            memory.extend(h.volume);
+            memory.extend(h.momentum.as_flattened());
+            memory.extend(h.kinetic);
+            memory.extend(h.moved);
+        }
         let rows: [&[f64]; 10] = [
             &state.fractions,
             &state.velocity[0],
@@ -228,7 +338,9 @@ impl Runout {
 
     /// Reads it back; none if the numbers are not those of such a scene.
     pub fn read(scene: &CliffScene, origin: &str, memory: &[f64]) -> Option<Self> {
-        let (head, mut rest) = memory.split_first_chunk::<HEAD>()?;
+        let (head, rest) = memory.split_first_chunk::<HEAD>()?;
+        let (count, rest) = rest.split_first()?;
+        let (rows, mut rest) = rest.split_at_checked(ROW * *count as usize)?;
         let mut take = || {
             let (length, after) = rest.split_first()?;
             let (row, after) = after.split_at_checked(*length as usize)?;
@@ -240,15 +352,20 @@ impl Runout {
         let &[time, velocity_time, next_step, steps, push] = times.as_slice() else {
             return None;
         };
-        let [diameter, grain_density, solid, width, begun, ..] = *head;
+        let [diameter, grain_density, solid, width, begun, interval, ..] = *head;
         let law = scene.runout.law(diameter, grain_density, solid);
-        let mut runout = Self::bare(scene, origin, law, width).ok()?;
-        runout.handed = Handed {
-            volume: [head[9], head[10]],
-            momentum: [[head[11], head[12]], [head[13], head[14]]],
-            kinetic: [head[15], head[16], head[17]],
-            moved: [head[18], head[19]],
-        };
+        let mut runout = Self::bare(scene, origin, law, [width, interval]).ok()?;
+        for h in rows.as_chunks::<ROW>().0 {
+            let handed = Handed {
+                grains: h[1] as usize,
+                mass: h[2],
+                volume: [h[3], h[4]],
+                momentum: [[h[5], h[6]], [h[7], h[8]]],
+                kinetic: [h[9], h[10], h[11]],
+                moved: [h[12], h[13]],
+            };
+            runout.instalments.push((h[0], handed));
+        }
         runout
             .collapse
             .set_state(SurfaceState {
@@ -270,7 +387,7 @@ impl Runout {
             })
             .ok()?;
         runout.begun = begun;
-        runout.steps = std::array::from_fn(|k| head[5 + k] as u64);
+        runout.steps = std::array::from_fn(|k| head[6 + k] as u64);
         Some(runout)
     }
 }

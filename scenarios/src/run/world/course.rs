@@ -282,7 +282,6 @@ fn follow(run: Followed, under: &mut Under) -> Result<(), Failure> {
     } = run;
     let steps = stand.steps;
     let row_every = (steps / recipe.keys().output.rows).max(1);
-    let steer_every = recipe.steer_every(stand.setup.timestep).max(1);
     let bar = Bar::new(&under.scene.name);
     let mut seen = Snapshot::default();
     let world = &stand.world;
@@ -316,7 +315,8 @@ fn follow(run: Followed, under: &mut Under) -> Result<(), Failure> {
     while simulation.steps_done() < steps && course == Course::On {
         let done = simulation.steps_done();
         let after = |every: u64| (done / every).saturating_add(1).saturating_mul(every);
-        let mut next = after(row_every).min(after(steer_every)).min(steps);
+        let steered = recipe.next_steer(done, stand.setup.timestep, state);
+        let mut next = after(row_every).min(steered).min(steps);
         next = next.min(done + STEPS_PER_LOOK);
         next = frames.next(done).map_or(next, |frame| frame.min(next));
         next = next.min(pictures.next(done, steps));
@@ -326,7 +326,7 @@ fn follow(run: Followed, under: &mut Under) -> Result<(), Failure> {
         simulation
             .advance(next - done)
             .map_err(|error| Failure::Run(error.to_string()))?;
-        if next.is_multiple_of(steer_every) {
+        if next == steered {
             course = recipe.steer(simulation, state)?;
         }
         if next.is_multiple_of(row_every) || next == steps || course == Course::Over {
@@ -343,11 +343,13 @@ fn follow(run: Followed, under: &mut Under) -> Result<(), Failure> {
         bar.set(next as f64 / steps as f64);
         if course == Course::On {
             under.checkpoint("steps", || {
+                recipe.keep(state);
                 saved(simulation, history, averages.as_deref(), state)
             })?;
         }
     }
     bar.clear();
+    recipe.keep(state);
     let done = simulation.steps_done();
     let groups = recipe.groups(simulation, state);
     let behind = recipe.continuum(simulation, state);

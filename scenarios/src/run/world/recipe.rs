@@ -109,6 +109,16 @@ pub trait Recipe: Debug + Sync {
         u64::MAX
     }
 
+    /// Step at which [`Recipe::steer`] is called next, after so many steps (of this length, s).
+    fn next_steer(&self, done: u64, timestep: f64, _state: &[f64]) -> u64 {
+        let every = self.steer_every(timestep).max(1);
+        (done / every).saturating_add(1).saturating_mul(every)
+    }
+
+    /// Brings the memory up to date before it is written or read by others: where [`Recipe::steer`] is called too often to do it
+    /// each time.
+    fn keep(&self, _state: &mut Vec<f64>) {}
+
     /// Drives the run, at step 0 and then every so many steps. `state` is the recipe's own memory, empty at
     /// first; it is part of checkpoints.
     fn steer(

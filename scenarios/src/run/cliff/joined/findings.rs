@@ -3,12 +3,14 @@
 use super::{JoinedCliff, Live};
 use crate::failure::Failure;
 use crate::run::cliff::record::CliffRecord;
+use crate::run::cliff::runout::Runout;
 use crate::run::land::Land;
 use crate::run::world::Ran;
 use crate::run::world::boulders::boulders;
 use crate::state_hash;
 use crate::summary::{Figure, Quantity, Summary};
 use crate::table::Table;
+use colluvium_coupling::handover::Handed;
 
 impl JoinedCliff<'_> {
     /// What the run has come to, with a continuum at its end.
@@ -19,7 +21,7 @@ impl JoinedCliff<'_> {
         ran: &mut Ran,
         summary: &mut Summary,
     ) -> Result<Vec<Table>, Failure> {
-        let Live { broken, runout } = live;
+        let Live { broken, runout, .. } = live;
         let none = || Failure::Run("the cliff was never looked at".into());
         let axis = self.scene.heap_axis(runout.diameter());
         let record = CliffRecord::read(memory, axis.columns).ok_or_else(none)?;
@@ -47,8 +49,12 @@ impl JoinedCliff<'_> {
         self.scene.put_boulders(broken.bonds, &sizes, summary);
         summary.remarks.push(format!(
             "Its grains became a continuum {:.0} s after the start; contacts, turn, bonds and boulders are those of then.",
-            runout.begun
+            runout.instalments.last().map_or(runout.begun, |(time, _)| *time)
         ));
+        if live.standing.as_ref().is_some_and(|s| s.free > 0) {
+            let word = "Some of it stands to the end and stayed grains.";
+            summary.remarks.push(word.into());
+        }
         self.book(live, ran, summary);
         summary.figures.push(Figure::history(
             "kinetic energy [J]",
@@ -67,17 +73,23 @@ impl JoinedCliff<'_> {
         let tables = record.heap.tables(places.clone(), deposit);
         let mut tables = Land::beside(land.as_ref(), &places, tables);
         tables.push(sizes);
+        tables.push(instalments(runout));
         Ok(tables)
     }
 
     /// The hand-over, cost, and the ledger.
     fn book(&self, live: &Live, ran: &mut Ran, summary: &mut Summary) {
-        let Live { broken, runout } = live;
+        let Live {
+            broken,
+            runout,
+            standing,
+        } = live;
         let grains = ran.packing.grains.len() as f64;
-        let [steps, handed_over] = broken.counts;
+        let begun = broken.counts[0];
+        let beside = standing.as_ref().map_or(0, |s| s.grain_steps) as f64;
         // Grains that are held cost nothing that counts as a grain-step.
         let counted = ran.simulation.steps_done() as f64 * grains;
-        let spared = counted - steps * grains;
+        let spared = counted - begun * grains - beside;
         summary.cost.grain_steps -= (spared as u64).min(summary.cost.grain_steps);
         let [made, iterations, cuts, cell_steps] = runout.steps;
         summary.cost.cell_steps = cell_steps;
@@ -86,11 +98,14 @@ impl JoinedCliff<'_> {
             summary.cost.cell_steps_per_s = cell_steps as f64 / summary.cost.wall_s;
         }
         summary.model.cells = runout.cells();
-        let h = &runout.handed;
         summary.ledger.mass_relative = runout.volume_drift();
-        let scale = (2.0 * h.kinetic[0] * runout.mass()).sqrt();
-        let off = (0..2).map(|c| (h.momentum[1][c] - h.momentum[0][c]).abs());
-        let off = off.fold(0.0, f64::max) / scale;
+        let all = || runout.instalments.iter().map(|(_, handed)| handed);
+        let sum = |of: &dyn Fn(&Handed) -> f64| all().map(of).sum::<f64>();
+        let off = all().map(momentum_error).fold(0.0, f64::max);
+        let volume = [0, 1].map(|k| sum(&|h| h.volume[k]));
+        let kinetic = [0, 1, 2].map(|k| sum(&|h| h.kinetic[k]));
+        let handed_over = sum(&|h| h.grains as f64);
+        let mass = sum(&|h| h.mass);
         let mut put = |name: &str, value: f64, unit: &str, source: &str| {
             summary.put(name, Quantity::new(value, unit).from(source));
         };
@@ -98,12 +113,51 @@ impl JoinedCliff<'_> {
             "time_of_handover",
             runout.begun,
             "s",
-            "when the grains became a continuum, from the start of the run",
+            "when the first grains became a continuum, from the start of the run",
         );
+        put(
+            "instalments",
+            runout.instalments.len() as f64,
+            "1",
+            "in which grains became a continuum",
+        );
+        put(
+            "grain_step_share",
+            (begun * grains + beside) / counted,
+            "1",
+            "of the steps of all grains to the end of the run; what is held is not counted",
+        );
+        put(
+            "handed_mass_error",
+            runout.mass() / mass - 1.0,
+            "1",
+            "of the continuum, which has one density, over its grains, less 1",
+        );
+        if let Some(standing) = standing {
+            let ledger = &standing.ground.ledger;
+            put(
+                "exchange_error",
+                ledger.residual(),
+                "1",
+                "of the impulses of grains and continuum on each other, over the sum of their sizes",
+            );
+            put(
+                "exchange_lost",
+                ledger.lost[0].hypot(ledger.lost[1]),
+                "N s",
+                "of them, that found no matter",
+            );
+            put(
+                "deepest_in_continuum",
+                ledger.deepest,
+                "1",
+                "over its diameter, how far a grain sank into the continuum",
+            );
+        }
         put("handed_grains", handed_over, "1", "that became a continuum");
         put(
             "handed_volume_error",
-            h.volume[1] / h.volume[0] - 1.0,
+            volume[1] / volume[0] - 1.0,
             "1",
             "volume of the continuum over that of the grains at the cliff's solid fraction, less 1",
         );
@@ -111,11 +165,11 @@ impl JoinedCliff<'_> {
             "handed_momentum_error",
             off,
             "1",
-            "over √(2 mass × kinetic energy)",
+            "over √(2 mass × kinetic energy), the largest of the instalments",
         );
         put(
             "handed_kinetic_share",
-            h.kinetic[2] / (h.kinetic[0] + h.kinetic[1]),
+            kinetic[2] / (kinetic[0] + kinetic[1]),
             "1",
             "kinetic energy of the continuum over that of its grains: spin and agitation about the mean are left",
         );
@@ -133,4 +187,29 @@ impl JoinedCliff<'_> {
                 .map(String::as_str),
         );
     }
+}
+
+/// Momentum that an instalment missed, over √(2 mass × kinetic energy).
+fn momentum_error(h: &Handed) -> f64 {
+    let scale = (2.0 * h.kinetic[0] * h.mass).sqrt();
+    let off = (0..2).map(|c| (h.momentum[1][c] - h.momentum[0][c]).abs());
+    off.fold(0.0, f64::max) / scale
+}
+
+/// When grains became continuum, and what of them.
+fn instalments(runout: &Runout) -> Table {
+    let rows = &runout.instalments;
+    let column = |of: &dyn Fn(&Handed) -> f64| rows.iter().map(|(_, h)| of(h)).collect();
+    Table::new("instalments")
+        .with("t", "s", rows.iter().map(|(time, _)| *time).collect())
+        .with("grains", "1", column(&|h| h.grains as f64))
+        .with("mass", "kg", column(&|h| h.mass))
+        .with("volume", "m³", column(&|h| h.volume[1]))
+        .with(
+            "volume_error",
+            "1",
+            column(&|h| h.volume[1] / h.volume[0] - 1.0),
+        )
+        .with("momentum_error", "1", column(&momentum_error))
+        .with("kinetic", "J", column(&|h| h.kinetic[0] + h.kinetic[1]))
 }
