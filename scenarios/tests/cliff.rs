@@ -67,11 +67,9 @@ fn debris_runs_out_as_a_continuum() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     succeed(folder.path(), &run("c", &["output.frames=0"]));
-    // Its wedge stands: with the slope of the scene it stays grains, and the run is theirs.
-    succeed(
-        folder.path(),
-        &run("g", &["model=hybrid", "output.frames=0"]),
-    );
+    // Its wedge stands: with the slope of the scene, as a whole, it stays grains, and the run is theirs.
+    let whole = ["model=hybrid", "runout.least_share=1", "output.frames=0"];
+    succeed(folder.path(), &run("g", &whole));
     assert_eq!(hash(&at("g")), hash(&at("c")));
     assert!(summary(&at("g"))["results"]["time_of_handover"].is_null());
     let standing = "runout.steepest_degrees=90";
@@ -128,6 +126,42 @@ fn debris_runs_out_as_a_continuum() {
     assert!(saved < grains["cost"]["grain_steps"].as_f64().unwrap());
 }
 
+/// What lies becomes a continuum while what stands goes on as grains beside it: books close, cost falls, it ends where grains do.
+#[test]
+fn what_lies_changes_hands_before_what_stands() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = |name: &str| folder.path().join(name);
+    succeed(folder.path(), &run("c", &["output.frames=0"]));
+    let sets = ["model=hybrid", "runout.least_share=0.05", "output.frames=0"];
+    succeed(folder.path(), &run("i", &sets));
+    let threads = [&run("t", &sets)[..], &["--threads", "2"]].concat();
+    succeed(folder.path(), &threads);
+    assert_eq!(hash(&at("t")), hash(&at("i")));
+    let [grains, found] = ["c", "i"].map(|name| summary(&at(name)));
+    println!("{}", found["results"]);
+    let of = |name: &str| value(&found, name);
+    assert!(of("instalments") >= 1.0);
+    for name in ["handed_volume_error", "handed_momentum_error", "exchange_error"] {
+        assert!(of(name).abs() < 1e-12, "{name} {}", of(name));
+    }
+    assert!(found["ledger"]["mass_relative"].as_f64().unwrap().abs() < 1e-12);
+    let (header, rows) = table(&at("i/instalments.csv"));
+    assert_eq!(header[..2], ["t", "grains"]);
+    assert_eq!(rows.len() as f64, of("instalments"));
+    assert!(of("deepest_in_continuum") < 0.25, "{}", of("deepest_in_continuum"));
+    assert!(of("grain_step_share") < 0.95);
+    let saved = found["cost"]["grain_steps"].as_f64().unwrap();
+    assert!(saved < grains["cost"]["grain_steps"].as_f64().unwrap());
+    let (_, deposit) = table(&at("i/deposit.csv"));
+    let spacing = deposit[1][0] - deposit[0][0];
+    let area = |rows: &[Vec<f64>], k: usize| rows.iter().map(|row| row[k] * spacing).sum::<f64>();
+    let (_, profiles) = table(&at("i/profiles.csv"));
+    let before = area(&profiles[..deposit.len()], 2);
+    assert!((area(&deposit, 1) / before - 1.0).abs() < 1e-9);
+    let [own, theirs] = [&found, &grains].map(|s| value(s, "x_front"));
+    assert!((own / theirs - 1.0).abs() < 0.3, "{own} {theirs}");
+}
+
 #[test]
 fn bad_cliffs_are_refused_by_key() {
     let folder = tempfile::tempdir().unwrap();
@@ -140,6 +174,12 @@ fn bad_cliffs_are_refused_by_key() {
             "runout.steepest_degrees=91",
             "runout.steepest_degrees",
             "(0, 90]",
+        ),
+        ("runout.least_share=0", "runout.least_share", "(0, 1]"),
+        (
+            "runout.sinking_diameters=0.6",
+            "runout.sinking_diameters",
+            "0.5",
         ),
         ("coarse_graining=400", "coarse_graining", "at most 333.333"),
         ("shape.wall=30", "shape.wall", "below the height"),

@@ -192,6 +192,23 @@ fn a_killed_cliff_goes_on_as_grains_and_as_a_continuum() {
     killed_and_whole("cliff", &sets, 13, 5);
 }
 
+/// Grains that stand beside the continuum that others have become, between and in the middle of exchanges.
+#[test]
+fn a_killed_cliff_goes_on_in_instalments() {
+    let sets = [
+        SMALL_COMET_CLIFF,
+        &[
+            "model=hybrid",
+            "runout.least_share=0.05",
+            "output.frames=4",
+        ],
+    ]
+    .concat();
+    let run = killed_and_whole("cliff", &sets, 17, 6);
+    let rows = table(&run.path().join("parts/instalments.csv")).1;
+    assert!(!rows.is_empty());
+}
+
 #[test]
 fn a_run_that_is_killed_at_its_very_end_is_tidied_up() {
     let folder = tempfile::tempdir().unwrap();

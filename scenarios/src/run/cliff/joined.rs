@@ -96,8 +96,11 @@ impl<'a> JoinedCliff<'a> {
 
     /// Brings back what is alive, if the grains have been handed over.
     fn recall(&self, guard: &mut Option<Live>, memory: &[f64]) -> Result<(), Failure> {
+        if guard.is_some() {
+            return Ok(());
+        }
         let (_, rest) = Self::parts(memory);
-        if guard.is_some() || rest.is_empty() {
+        if rest.is_empty() {
             return Ok(());
         }
         let damaged = || Failure::Input("--resume: the checkpoint is damaged: recipe/state".into());

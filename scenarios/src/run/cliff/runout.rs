@@ -175,7 +175,7 @@ impl Runout {
     /// Does something with cells, the part of each that is filled, and the mass of a whole one (kg).
     pub fn with_cells<T>(&self, act: impl FnOnce((&Room<'_>, &[f64], f64)) -> T) -> T {
         let fractions = &self.collapse.flow().state().fractions;
-        act((&self.room(), fractions, self.cell_mass()))
+        act((&self.room(), fractions.as_slice(), self.cell_mass()))
     }
 
     /// Takes what grains have pushed since the last exchange.
