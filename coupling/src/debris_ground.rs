@@ -50,6 +50,8 @@ pub struct SurfaceLedger {
     pub given: [f64; 3],
     /// Momentum that the continuum's velocities took.
     pub taken: [f64; 2],
+    /// Impulse that it has yet to take.
+    pub pending: [f64; 2],
     /// Impulse that found no face with matter.
     pub lost: [f64; 2],
     /// Sum of the sizes of all impulses.
@@ -61,8 +63,8 @@ pub struct SurfaceLedger {
 impl SurfaceLedger {
     /// What is missing between both sides, over the size of what was exchanged.
     pub fn residual(&self) -> f64 {
-        let off = |given: f64, taken: f64| (given + taken).abs();
-        let worst = off(self.given[0], self.taken[0]).max(off(self.given[2], self.taken[1]));
+        let off = |c: usize, given: f64| (given + self.taken[c] + self.pending[c]).abs();
+        let worst = off(0, self.given[0]).max(off(1, self.given[2]));
         if self.size > 0.0 {
             worst / self.size
         } else {
@@ -87,7 +89,7 @@ pub struct DebrisGround {
 }
 
 /// Numbers before the lists in a memory.
-const HEAD: usize = 13;
+const HEAD: usize = 15;
 
 impl DebrisGround {
     /// Of a surface, in a room.
@@ -226,6 +228,7 @@ impl DebrisGround {
                 self.ledger.lost[c] += impulse;
                 continue;
             }
+            self.ledger.pending[c] += impulse;
             for k in near(1) {
                 for i in near(0) {
                     self.owed[c][i + faces[0] * k] += impulse * weight(i, k)[0] / whole;
@@ -240,6 +243,7 @@ impl DebrisGround {
         (room, fractions, cell_mass): (&Room<'_>, &[f64], f64),
         velocity: [&mut [f64]; 2],
     ) {
+        self.ledger.pending = [0.0; 2];
         for (c, velocity) in velocity.into_iter().enumerate() {
             for (face, (u, owed)) in velocity.iter_mut().zip(&mut self.owed[c]).enumerate() {
                 if *owed != 0.0 {
@@ -258,6 +262,7 @@ impl DebrisGround {
         memory.extend([c.frequency, c.damping, c.friction, reacts]);
         memory.extend(l.given);
         memory.extend(l.taken);
+        memory.extend(l.pending);
         memory.extend(l.lost);
         memory.extend([l.size, l.deepest]);
         self.line.write(memory);
@@ -295,9 +300,10 @@ impl DebrisGround {
             ledger: SurfaceLedger {
                 given: [h[4], h[5], h[6]],
                 taken: [h[7], h[8]],
-                lost: [h[9], h[10]],
-                size: h[11],
-                deepest: h[12],
+                pending: [h[9], h[10]],
+                lost: [h[11], h[12]],
+                size: h[13],
+                deepest: h[14],
             },
             embedded: embedded
                 .as_chunks::<2>()

@@ -8,7 +8,9 @@ use colluvium_continuum::rheology::MuI;
 use colluvium_continuum::terrain::Profile;
 use colluvium_coupling::debris_ground::{DebrisGround, SurfaceContact, SurfaceLine};
 use colluvium_coupling::handover::Room;
-use colluvium_dem::{ContactLaw, Domain, Grain, GrainSample, Hooke, Setup, Simulation, TangentialSpring, Threads};
+use colluvium_dem::{
+    ContactLaw, Domain, Grain, GrainSample, Hooke, Setup, Simulation, TangentialSpring, Threads,
+};
 use nalgebra::Vector3;
 
 const DIAMETER: f64 = 0.1;
@@ -202,9 +204,15 @@ fn a_block_that_falls_on_a_bed_gives_it_its_momentum() {
     }
     assert!(found.residual < 1e-12, "{}", found.residual);
     assert!(found.deepest < 0.15, "{}", found.deepest);
-    assert!(found.deepest > 1e-3 && found.last_speed < 0.2, "{} {}", found.deepest, found.last_speed);
+    assert!(
+        found.deepest > 1e-3 && found.last_speed < 0.2,
+        "{} {}",
+        found.deepest,
+        found.last_speed
+    );
     let control = fall(false);
-    let off = (control.grains[0] + control.continuum[0]).hypot(control.grains[1] + control.continuum[1]);
+    let off =
+        (control.grains[0] + control.continuum[0]).hypot(control.grains[1] + control.continuum[1]);
     assert!(off > 0.8 * control.start, "{off} {}", control.start);
     assert!(control.residual > 0.1, "{}", control.residual);
 }

@@ -141,14 +141,22 @@ fn what_lies_changes_hands_before_what_stands() {
     println!("{}", found["results"]);
     let of = |name: &str| value(&found, name);
     assert!(of("instalments") >= 1.0);
-    for name in ["handed_volume_error", "handed_momentum_error", "exchange_error"] {
+    for name in [
+        "handed_volume_error",
+        "handed_momentum_error",
+        "exchange_error",
+    ] {
         assert!(of(name).abs() < 1e-12, "{name} {}", of(name));
     }
     assert!(found["ledger"]["mass_relative"].as_f64().unwrap().abs() < 1e-12);
     let (header, rows) = table(&at("i/instalments.csv"));
     assert_eq!(header[..2], ["t", "grains"]);
     assert_eq!(rows.len() as f64, of("instalments"));
-    assert!(of("deepest_in_continuum") < 0.25, "{}", of("deepest_in_continuum"));
+    assert!(
+        of("deepest_in_continuum") < 0.25,
+        "{}",
+        of("deepest_in_continuum")
+    );
     assert!(of("grain_step_share") < 0.95);
     let saved = found["cost"]["grain_steps"].as_f64().unwrap();
     assert!(saved < grains["cost"]["grain_steps"].as_f64().unwrap());

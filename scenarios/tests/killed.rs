@@ -197,11 +197,7 @@ fn a_killed_cliff_goes_on_as_grains_and_as_a_continuum() {
 fn a_killed_cliff_goes_on_in_instalments() {
     let sets = [
         SMALL_COMET_CLIFF,
-        &[
-            "model=hybrid",
-            "runout.least_share=0.05",
-            "output.frames=4",
-        ],
+        &["model=hybrid", "runout.least_share=0.05", "output.frames=4"],
     ]
     .concat();
     let run = killed_and_whole("cliff", &sets, 17, 6);

@@ -478,7 +478,9 @@ impl Recipe for JoinedCliff<'_> {
                 over = record.heap.resting >= STILL_LOOKS;
                 record.write(&mut memory);
             }
-            self.lay(&mut live, simulation)?;
+            if !over {
+                self.lay(&mut live, simulation)?;
+            }
             if looks {
                 Self::remember(&memory, Some(&live), state);
             }

@@ -2,6 +2,7 @@
 
 use super::{JoinedCliff, Live};
 use crate::failure::Failure;
+use crate::run::cliff::debris::volume_beyond;
 use crate::run::cliff::record::CliffRecord;
 use crate::run::cliff::runout::Runout;
 use crate::run::land::Land;
@@ -35,6 +36,8 @@ impl JoinedCliff<'_> {
         let across = ran.simulation.domain().lengths().y;
         let beyond = runout.parcels().into_iter().filter(|[x, _]| *x > 0.0);
         let beyond: f64 = beyond.map(|[_, volume]| volume).sum();
+        // What stands beside it is grains.
+        let beyond = beyond + volume_beyond(&ran.seen.grains, 0.0);
         let share = beyond / (record.heap.solid_fraction * across * self.scene.areas()[1]);
         // The columns' names are those of any boulders.
         let mut sizes = boulders(
