@@ -3,11 +3,14 @@
 //! A grain of mass m that overlaps the surface by δ and nears it by u_n, u_t along it, bears
 //!
 //! ```text
-//! F_n = max(0, m ω² (δ − δ₀) + 2 ζ m ω u_n),      F_t = min(μ F_n, m ω |u_t|),      M = min(μ R F_n, ⅖ m R² ω |Ω|)
+//! F_n = max(0, m' ω² (δ − δ₀) + 2 ζ m' ω u_n),      F_t = min(μ F_n, m' ω |u_t|),      M = min(μ R F_n, ⅖ m R² ω |Ω|)
+//! m' = m m_c/(m_c + n m)
 //! ```
 //!
-//! against its motion. ω = 1/T with the time T between two exchanges: a grain that comes with speed u sinks by u T, and with the
-//! continuum taking each exchange's impulse at its end, the pair stays stable, as ω T = 1 for a patch no lighter than the grain.
+//! against its motion. ω = 1/T with the time T between two exchanges: a grain that comes with speed u sinks by u T or little
+//! more. m_c = Σ m_f W_f is the mass of the continuum that takes the push (below), shared by n grains: as it takes each
+//! exchange's impulse at its end, no spring may be stiffer than ω² times the lighter of both. A film carries nobody: a grain goes
+//! through it to the ground below.
 //! δ₀ is what the grain overlapped when its neighbours became continuum: it presses from there on, and grows out of it.
 //!
 //! The opposite impulse is spread over the faces of cells about the place of contact, by a kernel W,
@@ -27,6 +30,8 @@ use colluvium_dem::{GrainSample, Load};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
+/// Grains that may press the same patch of the continuum.
+const SHARING: f64 = 8.0;
 /// Reach of the kernel by which the continuum takes a push, in cells.
 const SPREAD: f64 = 2.0;
 
@@ -90,6 +95,29 @@ pub struct DebrisGround {
 
 /// Numbers before the lists in a memory.
 const HEAD: usize = 15;
+
+/// Faces of a component with matter about a place (m): number, weight, and what they carry in whole cells.
+fn weights<'a>(
+    room: &'a Room<'_>,
+    fractions: &'a [f64],
+    c: usize,
+    at: [f64; 2],
+) -> impl Iterator<Item = (usize, f64, f64)> + 'a {
+    let reach = SPREAD * room.spacing;
+    let faces = room.faces(c);
+    let near = move |a: usize| {
+        let first = room.face(c, [0, 0])[a] - 0.5 * room.spacing;
+        around(at[a], reach, first, room.spacing, faces[a])
+    };
+    let places = near(1).flat_map(move |k| near(0).map(move |i| [i, k]));
+    places.filter_map(move |[i, k]| {
+        let face = i + faces[0] * k;
+        let load = room.carried(c, face, fractions);
+        let place = room.face(c, [i, k]);
+        let square = (place[0] - at[0]).powi(2) + (place[1] - at[1]).powi(2);
+        (load > 0.0).then(|| (face, kernel(square, reach), load))
+    })
+}
 
 impl DebrisGround {
     /// Of a surface, in a room.
@@ -155,13 +183,14 @@ impl DebrisGround {
             let v = grain.velocity - surface;
             let apart = v.dot(&normal);
             let slip = v - apart * normal + grain.spin.cross(&arm);
-            let m = grain.mass;
+            let patch = self.patch(room, fractions, cell_mass, near.place);
+            let m = grain.mass * patch / (patch + SHARING * grain.mass);
             let push = m * frequency * (frequency * depth - 2.0 * damping * apart);
             let push = push.max(0.0);
             let limited = |most: f64, free: f64| if free > most { most / free } else { 1.0 };
             let drag = -m * frequency * slip;
             let drag = drag * limited(friction * push, drag.norm());
-            let inertia = 0.4 * m * grain.radius.powi(2);
+            let inertia = 0.4 * grain.mass * grain.radius.powi(2);
             let turn = -inertia * frequency * grain.spin;
             let turn = turn * limited(friction * grain.radius * push, turn.norm());
             let force = push * normal + drag;
@@ -190,6 +219,15 @@ impl DebrisGround {
         loads
     }
 
+    /// Mass Σ m_f W_f (kg) about a place (m) that takes what is pushed there: the less of both components.
+    fn patch(&self, room: &Room<'_>, fractions: &[f64], cell_mass: f64, at: [f64; 2]) -> f64 {
+        let of = |c: usize| -> f64 {
+            let faces = weights(room, fractions, c, at);
+            faces.map(|(_, weight, load)| weight * load).sum()
+        };
+        cell_mass * of(0).min(of(1))
+    }
+
     /// Spreads an impulse (N s) over the faces about a place (m).
     fn owe(
         &mut self,
@@ -199,40 +237,16 @@ impl DebrisGround {
         at: [f64; 2],
         impulse: [f64; 2],
     ) {
-        let reach = SPREAD * room.spacing;
         for (c, impulse) in impulse.into_iter().enumerate() {
-            let faces = room.faces(c);
-            let near = |a: usize| {
-                let first = room.face(c, [0, 0])[a] - 0.5 * room.spacing;
-                around(at[a], reach, first, room.spacing, faces[a])
-            };
-            let weight = |i: usize, k: usize| {
-                let place = room.face(c, [i, k]);
-                let square = (place[0] - at[0]).powi(2) + (place[1] - at[1]).powi(2);
-                let load = room.carried(c, i + faces[0] * k, fractions);
-                if load > 0.0 {
-                    [kernel(square, reach), load]
-                } else {
-                    [0.0; 2]
-                }
-            };
-            let mut sum = 0.0;
-            for k in near(1) {
-                for i in near(0) {
-                    let [weight, load] = weight(i, k);
-                    sum += weight * load;
-                }
-            }
-            let whole = cell_mass * sum;
+            let faces = weights(room, fractions, c, at);
+            let whole = cell_mass * faces.map(|(_, weight, load)| weight * load).sum::<f64>();
             if whole <= 0.0 {
                 self.ledger.lost[c] += impulse;
                 continue;
             }
             self.ledger.pending[c] += impulse;
-            for k in near(1) {
-                for i in near(0) {
-                    self.owed[c][i + faces[0] * k] += impulse * weight(i, k)[0] / whole;
-                }
+            for (face, weight, _) in weights(room, fractions, c, at) {
+                self.owed[c][face] += impulse * weight / whole;
             }
         }
     }

@@ -193,7 +193,7 @@ fn fall(reacts: bool) -> Fall {
     }
 }
 
-/// What the grains lose the continuum gets, to round-off, and no grain sinks deeper than 0.15 of its diameter. Without the
+/// What the grains lose the continuum gets, to round-off, and no grain sinks deeper than a fifth of its diameter. Without the
 /// reaction the block's momentum is gone.
 #[test]
 fn a_block_that_falls_on_a_bed_gives_it_its_momentum() {
@@ -203,7 +203,7 @@ fn a_block_that_falls_on_a_bed_gives_it_its_momentum() {
         assert!(off < 1e-12 * found.start, "{off} {}", found.start);
     }
     assert!(found.residual < 1e-12, "{}", found.residual);
-    assert!(found.deepest < 0.15, "{}", found.deepest);
+    assert!(found.deepest < 0.2, "{}", found.deepest);
     assert!(
         found.deepest > 1e-3 && found.last_speed < 0.2,
         "{} {}",
