@@ -4,11 +4,11 @@
 //!
 //! ```text
 //! F_n = max(0, m' ω² (δ − δ₀) + 2 ζ m' ω u_n),      F_t = min(μ F_n, m' ω |u_t|),      M = min(μ R F_n, ⅖ m R² ω |Ω|)
-//! m' = m m_c/(m_c + n m)
+//! m' = m m_c/(m_c + Σ m)
 //! ```
 //!
 //! against its motion. ω = 1/T with the time T between two exchanges: a grain that comes with speed u sinks by u T or little
-//! more. m_c = Σ m_f W_f is the mass of the continuum that takes the push (below), shared by n grains: as it takes each
+//! more. m_c = Σ m_f W_f is the mass of the continuum that takes the push (below), Σ m that of all grains that press within its reach: as it takes each
 //! exchange's impulse at its end, no spring may be stiffer than ω² times the lighter of both. A film carries nobody: a grain goes
 //! through it to the ground below.
 //! δ₀ is what the grain overlapped when its neighbours became continuum: it presses from there on, and grows out of it.
@@ -30,8 +30,6 @@ use colluvium_dem::{GrainSample, Load};
 use nalgebra::Vector3;
 use std::collections::BTreeMap;
 
-/// Grains that may press the same patch of the continuum.
-const SHARING: f64 = 8.0;
 /// Reach of the kernel by which the continuum takes a push, in cells.
 const SPREAD: f64 = 2.0;
 
@@ -165,6 +163,7 @@ impl DebrisGround {
             reacts,
         } = self.contact;
         let mut loads = Vec::new();
+        let mut touches: Vec<(&GrainSample, f64, Near)> = Vec::new();
         for grain in grains.iter().filter(|g| !g.fixed) {
             let found = self.overlap(grain, later, room.spacing);
             let before = self.embedded.get(&grain.id).copied().unwrap_or(0.0);
@@ -176,7 +175,9 @@ impl DebrisGround {
                 self.embedded.insert(grain.id, overlap);
                 continue;
             }
-            let depth = overlap - before;
+            touches.push((grain, overlap - before, near));
+        }
+        for &(grain, depth, near) in &touches {
             let normal = Vector3::new(near.normal[0], 0.0, near.normal[1]);
             let surface = Vector3::new(near.velocity[0], 0.0, near.velocity[1]);
             let arm = -grain.radius * normal;
@@ -184,7 +185,12 @@ impl DebrisGround {
             let apart = v.dot(&normal);
             let slip = v - apart * normal + grain.spin.cross(&arm);
             let patch = self.patch(room, fractions, cell_mass, near.place);
-            let m = grain.mass * patch / (patch + SHARING * grain.mass);
+            let beside = touches.iter().filter(|(_, _, other)| {
+                let apart = [0, 1].map(|a| other.place[a] - near.place[a]);
+                apart[0].hypot(apart[1]) < SPREAD * room.spacing
+            });
+            let pressing: f64 = beside.map(|(other, _, _)| other.mass).sum();
+            let m = grain.mass * patch / (patch + pressing);
             let push = m * frequency * (frequency * depth - 2.0 * damping * apart);
             let push = push.max(0.0);
             let limited = |most: f64, free: f64| if free > most { most / free } else { 1.0 };

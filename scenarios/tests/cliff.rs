@@ -4,7 +4,7 @@
 
 mod command;
 
-use command::{SMALL_COMET_CLIFF, colluvium, hash, succeed, summary, table, value};
+use command::{INSTALMENTS, SMALL_COMET_CLIFF, colluvium, hash, succeed, summary, table, value};
 
 fn run<'a>(out: &'a str, sets: &[&'a str]) -> Vec<&'a str> {
     let mut list = vec!["run", "cliff", "--out", out];
@@ -132,7 +132,7 @@ fn what_lies_changes_hands_before_what_stands() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     succeed(folder.path(), &run("c", &["output.frames=0"]));
-    let sets = ["model=hybrid", "runout.least_share=0.05", "output.frames=0"];
+    let sets = [INSTALMENTS, &["output.frames=0"]].concat();
     succeed(folder.path(), &run("i", &sets));
     let threads = [&run("t", &sets)[..], &["--threads", "2"]].concat();
     succeed(folder.path(), &threads);
@@ -140,7 +140,7 @@ fn what_lies_changes_hands_before_what_stands() {
     let [grains, found] = ["c", "i"].map(|name| summary(&at(name)));
     println!("{}", found["results"]);
     let of = |name: &str| value(&found, name);
-    assert!(of("instalments") >= 1.0);
+    assert!(of("instalments") >= 2.0);
     for name in [
         "handed_volume_error",
         "handed_momentum_error",
@@ -153,11 +153,11 @@ fn what_lies_changes_hands_before_what_stands() {
     assert_eq!(header[..2], ["t", "grains"]);
     assert_eq!(rows.len() as f64, of("instalments"));
     assert!(
-        of("deepest_in_continuum") < 0.25,
+        of("deepest_in_continuum") < 0.5,
         "{}",
         of("deepest_in_continuum")
     );
-    assert!(of("grain_step_share") < 0.95);
+    assert!(of("grain_step_share") < 0.8);
     let saved = found["cost"]["grain_steps"].as_f64().unwrap();
     assert!(saved < grains["cost"]["grain_steps"].as_f64().unwrap());
     let (_, deposit) = table(&at("i/deposit.csv"));

@@ -5,8 +5,8 @@
 mod command;
 
 use command::{
-    MOVING_EDGE, SMALL_COMET_CLIFF, SMALL_HYBRID, SMALL_JOINED_COLUMN, colluvium, hash, succeed,
-    table,
+    INSTALMENTS, MOVING_EDGE, SMALL_COMET_CLIFF, SMALL_HYBRID, SMALL_JOINED_COLUMN, colluvium,
+    hash, succeed, table,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -195,11 +195,7 @@ fn a_killed_cliff_goes_on_as_grains_and_as_a_continuum() {
 /// Grains that stand beside the continuum that others have become, between and in the middle of exchanges.
 #[test]
 fn a_killed_cliff_goes_on_in_instalments() {
-    let sets = [
-        SMALL_COMET_CLIFF,
-        &["model=hybrid", "runout.least_share=0.05", "output.frames=4"],
-    ]
-    .concat();
+    let sets = [SMALL_COMET_CLIFF, INSTALMENTS, &["output.frames=4"]].concat();
     let run = killed_and_whole("cliff", &sets, 17, 6);
     let rows = table(&run.path().join("parts/instalments.csv")).1;
     assert!(!rows.is_empty());

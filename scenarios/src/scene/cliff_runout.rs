@@ -59,7 +59,7 @@ impl Default for CliffRunoutKeys {
         Self {
             kinetic_share: 0.1,
             steepest_degrees: 45.0,
-            least_share: 0.1,
+            least_share: 1.0,
             sinking_diameters: 0.05,
             mu_s: 0.6,
             mu_2: 0.9,

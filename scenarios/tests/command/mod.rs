@@ -19,6 +19,14 @@ pub const SMALL_COMET_CLIFF: &[&str] = &[
     "packing=small",
 ];
 
+/// With these a hybrid cliff in small hands over two instalments, and some of it stands to the end.
+pub const INSTALMENTS: &[&str] = &[
+    "model=hybrid",
+    "runout.least_share=0.02",
+    "runout.steepest_degrees=50",
+    "runout.kinetic_share=0.5",
+];
+
 /// Settings of the scene `incline` that take a second: 500 grains' mass, 9 of 16 diameters grains in the hybrid.
 pub const SMALL_HYBRID: &[&str] = &[
     "scale=0.85",
