@@ -27,6 +27,7 @@
 pub(crate) mod contact;
 mod cuts;
 pub(crate) mod faces;
+mod foot;
 mod layers;
 mod operators;
 mod points;
