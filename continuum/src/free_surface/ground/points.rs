@@ -58,6 +58,28 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         (all - (1.0 / points_of(D) as f64 - free)).clamp(0.0, free)
     }
 
+    /// Adds the friction of side walls on a cell, a point for each corner. Whatever lies there rubs along its sides with what
+    /// there is of it, where the traction of the ground acts on all of the ground's surface, and thin layers do, too.
+    pub(super) fn add_rubbing<const V: usize>(
+        &self,
+        ground: &Ground<D>,
+        cell: usize,
+        points: &mut Vec<QuadraturePoint<C, V>>,
+        places: &mut Vec<usize>,
+    ) {
+        let Some(walls) = self.side_walls else { return };
+        for corner in 0..points_of(D) {
+            let beside = self.material_in_part(ground, cell, corner);
+            if beside > 0.0
+                && let Some(point) =
+                    self.rubbing_over(ground, walls, cell, sides_of::<D>(corner), beside)
+            {
+                points.push(point);
+                places.push((self.fractions.len() + cell) * points_of(D) + corner);
+            }
+        }
+    }
+
     /// Adds the quadrature points of one cell, one for each corner.
     pub(super) fn add_cell<const V: usize>(
         &self,
@@ -84,14 +106,6 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             };
             if volume <= 0.0 {
                 continue;
-            }
-            // A layer rubs along its sides with what there is of it.
-            let beside = if layer.is_some() { filled() } else { volume };
-            if let Some(walls) = self.side_walls
-                && let Some(point) = self.rubbing_over(ground, walls, cell, side, beside)
-            {
-                points.push(point);
-                places.push((self.fractions.len() + cell) * points_of(D) + corner);
             }
             let mut point = QuadraturePoint::new(volume * self.grid.cell_volume());
             for (axis, rows) in rows.iter().enumerate() {
