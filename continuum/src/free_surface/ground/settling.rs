@@ -69,13 +69,14 @@ impl<const D: usize> Ground<D> {
             asked,
             cells,
         } = work;
-        let (amount, room): (&dyn Fn(usize, f64) -> f64, &dyn Fn(usize, f64) -> f64) =
-            match exchange {
-                Exchange::Take => (&|_, f| -f, &|_, f| f.max(0.0)),
-                Exchange::Give => (&|cell, f| f - self.free[cell], &|cell, f| {
-                    (self.free[cell] - f).max(0.0)
-                }),
-            };
+        let amount = |cell: usize, fraction: f64| match exchange {
+            Exchange::Take => -fraction,
+            Exchange::Give => fraction - self.free[cell],
+        };
+        let room = |cell: usize, fraction: f64| match exchange {
+            Exchange::Take => fraction.max(0.0),
+            Exchange::Give => (self.free[cell] - fraction).max(0.0),
+        };
         cells.clear();
         let wrong = fractions.iter().enumerate();
         cells.extend(
