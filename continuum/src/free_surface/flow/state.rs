@@ -110,7 +110,7 @@ pub struct SurfaceState<const D: usize = DIMENSIONS, const C: usize = COMPONENTS
     /// Pressure of each cell, negative where there is none.
     pub pressure: Vec<f64>,
     /// Stress at each corner of each cell, then the traction of side walls there if there are any, then
-    /// that of ground in each cell under Coulomb friction.
+    /// that of ground in each cell under Coulomb friction, then the friction of thin layers on ground.
     pub stress: Vec<[f64; C]>,
     /// What the next step takes from the last one.
     pub history: History<D, C>,
