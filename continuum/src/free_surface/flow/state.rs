@@ -101,7 +101,7 @@ pub struct SurfaceStep {
 }
 
 /// State of a flow with a moving surface, on all of its grid.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub struct SurfaceState<const D: usize = DIMENSIONS, const C: usize = COMPONENTS> {
     /// Fraction of each cell that is filled.
     pub fractions: Vec<f64>,
@@ -124,6 +124,40 @@ pub struct SurfaceState<const D: usize = DIMENSIONS, const C: usize = COMPONENTS
     pub passed: [f64; 2],
     /// Steps made.
     pub steps: usize,
+}
+
+impl<const D: usize, const C: usize> Clone for SurfaceState<D, C> {
+    fn clone(&self) -> Self {
+        let mut copy = Self::default();
+        copy.clone_from(self);
+        copy
+    }
+
+    /// Into the memory that is there: every step keeps what it began with.
+    fn clone_from(&mut self, other: &Self) {
+        let Self {
+            fractions,
+            velocity,
+            pressure,
+            stress,
+            history,
+            time,
+            velocity_time,
+            next_step,
+            passed,
+            steps,
+        } = other;
+        self.fractions.clone_from(fractions);
+        self.velocity.clone_from(velocity);
+        self.pressure.clone_from(pressure);
+        self.stress.clone_from(stress);
+        self.history.clone_from(history);
+        self.time = *time;
+        self.velocity_time = *velocity_time;
+        self.next_step = *next_step;
+        self.passed = *passed;
+        self.steps = *steps;
+    }
 }
 
 impl<const D: usize, const C: usize> Default for SurfaceState<D, C> {
