@@ -109,7 +109,7 @@ const NEWTON_TOLERANCE: f64 = 1e-3;
 
 /// Residual of the first linear system of an attempt in a plane, over [`PrimalDualOptions::linear_tolerance`]: what the law
 /// bends by leaves more.
-const FIRST_LOOSE: f64 = 20.0;
+const FIRST_LOOSE: f64 = 10.0;
 /// Residual of a linear system, as a part of what the nonlinear ones may be over what they are.
 const FORCING: f64 = 0.3;
 /// Loosest residual of a linear system over [`PrimalDualOptions::linear_tolerance`].

@@ -16,7 +16,8 @@ use crate::yield_step::{PrimalDualOptions, Residuals};
 #[serde(deny_unknown_fields, default)]
 pub struct SurfaceOptions {
     /// Largest Δt Σ |u|/h over the axes, at most 1. Above ½ material moves in two parts with one
-    /// velocity.
+    /// velocity. At 0.9 plane columns come to rest with their fronts within 0.25 % and their profiles within 0.2 % of the area
+    /// of those at 0.1125.
     pub courant: f64,
     /// Largest time step.
     pub largest_step: f64,
@@ -52,7 +53,20 @@ impl Default for SurfaceOptions {
     }
 }
 
+/// Largest Courant number of flows of first order in the time step.
+const FIRST_ORDER_COURANT: f64 = 0.45;
+
 impl SurfaceOptions {
+    /// The same for a flow whose state is changed from outside step by step: nothing is taken from the step before, and the
+    /// steps are as short as the larger error then asks.
+    pub fn of_first_order(self) -> Self {
+        Self {
+            second_order: false,
+            courant: self.courant.min(FIRST_ORDER_COURANT),
+            ..self
+        }
+    }
+
     /// Refuses settings that cannot work.
     ///
     /// # Errors

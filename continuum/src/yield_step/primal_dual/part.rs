@@ -17,7 +17,7 @@ const SHARE_OF_STRESS: f64 = 0.5;
 /// and in any case by more than this over what is allowed,
 const SHARE_ALLOWED: f64 = 0.5;
 /// or if it lies no more points than this away from such a velocity: pressure passes a correction on.
-const LAYERS: usize = 2;
+const LAYERS: usize = 3;
 /// Largest part that is worth while, over the whole.
 const LARGEST_PART: f64 = 0.3;
 /// Residuals at which the iteration on a part ends, over what is allowed of the whole,
