@@ -127,6 +127,31 @@ fn restart_gives_the_same_bits() {
     assert!(resumed.set_state(Default::default()).is_err());
 }
 
+/// A step that ends in an error leaves the state as it was, whether it does not converge or the solver refuses its settings.
+#[test]
+fn a_step_that_fails_changes_nothing() {
+    let case = wide(32);
+    let mut moving = Collapse::new(&case, &SurfaceOptions::default()).unwrap();
+    for _ in 0..5 {
+        moving.step(f64::INFINITY).unwrap();
+    }
+    let before = moving.flow().state().clone();
+    let mut unreachable = SurfaceOptions::default();
+    unreachable.solver.momentum_tolerance = 1e-30;
+    unreachable.solver.tolerance_in_motion = 1.0;
+    unreachable.solver.max_iterations = 1;
+    let mut refused = SurfaceOptions::default();
+    refused.solver.floor_factor = 2.0;
+    for options in [unreachable, refused] {
+        let mut collapse = Collapse::new(&case, &options).unwrap();
+        collapse.set_state(before.clone()).unwrap();
+        collapse.step(f64::INFINITY).unwrap_err();
+        assert_eq!(*collapse.flow().state(), before);
+    }
+    moving.step(f64::INFINITY).unwrap();
+    assert_ne!(*moving.flow().state(), before);
+}
+
 /// A step of Courant number one moves its material in two parts and keeps every fraction in [0, 1].
 #[test]
 fn long_steps_move_material_in_parts() {
