@@ -34,7 +34,7 @@ use crate::grid::DIMENSIONS;
 use crate::rheology::Rheology;
 
 /// Velocity, pressure and stress on a grid, in natural units.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub struct FlowState<const C: usize = COMPONENTS> {
     /// Unknown velocities, in the grid's numbering.
     pub u: Vec<f64>,
@@ -42,6 +42,23 @@ pub struct FlowState<const C: usize = COMPONENTS> {
     pub p: Vec<f64>,
     /// Stress at each quadrature point: ((τ_xx − τ_zz)/2, τ_xz) in a plane flow.
     pub s: Vec<[f64; C]>,
+}
+
+impl<const C: usize> Clone for FlowState<C> {
+    fn clone(&self) -> Self {
+        Self {
+            u: self.u.clone(),
+            p: self.p.clone(),
+            s: self.s.clone(),
+        }
+    }
+
+    /// Into the memory that is there.
+    fn clone_from(&mut self, other: &Self) {
+        self.u.clone_from(&other.u);
+        self.p.clone_from(&other.p);
+        self.s.clone_from(&other.s);
+    }
 }
 
 impl<const C: usize> FlowState<C> {

@@ -23,13 +23,21 @@ fn case(aspect: f64) -> CylinderCase {
 }
 
 fn begun(surface: Surface, whole: bool) -> CylinderCollapse {
+    begun_on(surface, whole, case(1.0).cells)
+}
+
+fn begun_on(surface: Surface, whole: bool, cells: usize) -> CylinderCollapse {
     let mut options = SurfaceOptions::default();
     options.solver.linear_tolerance = 1e-9;
     let ground = CylinderGround {
         surface,
         contact: Contact::NoSlip,
     };
-    let case = CylinderCase { whole, ..case(1.0) };
+    let case = CylinderCase {
+        whole,
+        cells,
+        ..case(1.0)
+    };
     CylinderCollapse::over_ground(&case, &options, &ground).unwrap()
 }
 
@@ -95,8 +103,24 @@ fn cylinders_run_down_cones() {
     eprintln!("covered {down} {even}");
     assert_eq!(rests, [true, true]);
     assert!(level.asymmetry() < 1e-9, "{:e}", level.asymmetry());
-    assert!(steep.asymmetry() < 0.1, "{:e}", steep.asymmetry());
+    assert!(steep.asymmetry() < 1e-6, "{:e}", steep.asymmetry());
     assert!(down > 1.2 * even, "{down} {even}");
+}
+
+/// To round-off, which the flow amplifies: friction of a layer that begins to slide takes nothing from the corners whose
+/// stress was kept before, and of the cells beside room for what does not fit into them none comes first.
+#[test]
+fn cylinders_on_cones_stay_symmetric() {
+    for (whole, cells, until) in [(false, 16, 1.6), (true, 8, 1.0)] {
+        let cone = HeightSum {
+            radial: vec![[0.0, 0.5], [2.0, 0.0]],
+            ..HeightSum::default()
+        };
+        let mut collapse = begun_on(land(&cone), whole, cells);
+        go_on(&mut collapse, until);
+        eprintln!("{cells} cells: asymmetry {:e}", collapse.asymmetry());
+        assert!(collapse.asymmetry() < 1e-10, "{:e}", collapse.asymmetry());
+    }
 }
 
 /// In a valley along x, with sides steeper than repose, the heap keeps both mirror symmetries and runs farther along it

@@ -7,7 +7,7 @@ use colluvium_continuum::free_surface::{Contact, SurfaceFlow, SurfaceOptions, Te
 use colluvium_continuum::grid::{Axis, Boundary, Grid};
 use colluvium_continuum::rheology::MuI;
 use colluvium_continuum::terrain::Profile;
-use colluvium_continuum::wall_friction::WallFriction;
+use colluvium_continuum::wall_friction::{SideWalls, WallFriction};
 
 const ROUGH: Boundary = Boundary::NoSlip { velocity: 0.0 };
 const SMOOTH: Boundary = Boundary::FreeSlip;
@@ -400,6 +400,47 @@ fn level_ground_is_a_level_floor() {
     let miss = miss(&on_a_floor(64), &on_level_ground(64, 1.0));
     println!("deposits differ by {miss:.2e}");
     assert!(miss < 3e-3, "{miss:e}");
+}
+
+/// Walls of a channel rub on the thin layers of a heap over level ground as they do over a level floor, for which there is
+/// other code: the deposits are as near to each other as without walls. The walls have a part in them: without them the
+/// deposit is another one.
+#[test]
+fn side_walls_rub_over_level_ground_as_over_a_floor() {
+    let cells = 64;
+    let walls = SideWalls {
+        width: 0.3,
+        friction: WallFriction {
+            friction: 0.3,
+            cohesion: 0.0,
+        },
+    };
+    let case = CollapseCase {
+        overhang_degrees: 0.0,
+        aspect: 1.42,
+        height: 1.0,
+        gravity: 1.0,
+        rheology: grains(),
+        cells,
+        length_scaled: 5.0,
+    };
+    let options = SurfaceOptions::default();
+    let level = no_slip(&[[0.0, 0.0], [5.0, 0.0]]);
+    let open = Collapse::new(&case, &options).unwrap();
+    let floor = Collapse::between_side_walls(&case, &options, walls).unwrap();
+    let ground = Collapse::over_ground(&case, &options, &level, Some(walls)).unwrap();
+    let [open, floor, ground] = [open, floor, ground].map(|mut collapse| {
+        while collapse.time() < 4.0 - 1e-9 {
+            collapse.step(4.0).unwrap();
+        }
+        collapse
+    });
+    let [apart, without] = [miss(&floor, &ground), miss(&floor, &open)];
+    println!(
+        "deposits between walls differ by {apart:.2e}, from the one without walls by {without:.2e}"
+    );
+    assert!(apart < 3e-3, "{apart:e}");
+    assert!(without > 0.05, "{without:e}");
 }
 
 /// Heaps over ground have no steps where their surface passes half a cell: 0.015 and 0.019 of a cell, 0.044 and 0.075 while

@@ -109,3 +109,84 @@ fn a_collapse_has_a_smaller_error_in_time() {
     println!("error of the bulk with second and first order: {errors:.6?}");
     assert!(errors[0] < 0.4 * errors[1], "{errors:?}");
 }
+
+/// Thickness and velocity along x of a layer with a wavy surface at a time of 1.5 after it was let go on a slope of 0.43 rad, in
+/// steps of so long; of which, if they are `uneven`, each second one is longer by half.
+fn wavy_layer(dt: f64, second_order: bool, uneven: bool) -> [Vec<f64>; 2] {
+    let (cells, slope, end) = (24, 0.43_f64, 1.5);
+    let axes = [
+        Axis::Periodic { length: 1.2, cells },
+        Axis::Bounded {
+            length: 1.2,
+            cells,
+            low: Boundary::NoSlip { velocity: 0.0 },
+            high: Boundary::FreeSlip,
+        },
+    ];
+    let mut options = SurfaceOptions {
+        second_order,
+        largest_step: 1.2 * dt,
+        growth: 1e6,
+        courant: 1.0,
+        ..SurfaceOptions::default()
+    };
+    options.solver.strain_rate_floor = 1e-5;
+    options.solver.stress_tolerance = 1e-8;
+    options.solver.momentum_tolerance = 1e-9;
+    options.solver.tolerance_in_motion = 1.0;
+    let height = |x: f64| 0.8 + 0.1 * (std::f64::consts::TAU * x / 1.2).sin();
+    let h = 1.2 / cells as f64;
+    let fractions = (0..cells * cells)
+        .map(|n| {
+            let (i, k) = (n % cells, n / cells);
+            ((height((i as f64 + 0.5) * h) - k as f64 * h) / h).clamp(0.0, 1.0)
+        })
+        .collect();
+    let grid = Grid::with_moving_surface(axes).unwrap();
+    let gravity = [slope.sin(), -slope.cos()];
+    let mut flow = SurfaceFlow::at_rest(grid, fractions, grains(0.04), gravity, options).unwrap();
+    let bulk = cells / 2 * cells;
+    let velocity = |flow: &SurfaceFlow<MuI>| flow.state().velocity[0][..bulk].to_vec();
+    let mut before = (0.0, velocity(&flow));
+    while flow.state().time < end - 1e-9 {
+        let factor = match (uneven, flow.state().steps % 2) {
+            (false, _) => 1.0,
+            (true, 0) => 0.8,
+            (true, _) => 1.2,
+        };
+        let left = end - flow.state().time;
+        before = (flow.state().velocity_time, velocity(&flow));
+        flow.step(left.min(factor * dt)).unwrap();
+    }
+    // Velocities belong to the middle of a step: between the last two lies the end.
+    let share = (end - before.0) / (flow.state().velocity_time - before.0);
+    let pairs = before.1.iter().zip(velocity(&flow));
+    let at_end = pairs.map(|(a, b)| a + share * (b - a)).collect();
+    [flow.heights(), at_end]
+}
+
+/// With a surface that moves over cells the error of a step, in even and uneven ones, is a quarter of that of first order in the
+/// velocity below, a third in the thickness. What is left does not fall like Δt² on one grid: fluxes through faces depend on
+/// uΔt/h (the part of it falls with h: with 40 cells for 24 the velocity's error in 40 steps is 2.6e-4 for 5.1e-4).
+#[test]
+fn a_wavy_layer_is_carried_with_a_smaller_error() {
+    let errors = |second_order: bool, uneven: bool| {
+        let fine = wavy_layer(1.5 / 320.0, second_order, uneven);
+        [20.0, 40.0].map(|steps| {
+            let found = wavy_layer(1.5 / steps, second_order, uneven);
+            [0, 1].map(|n| {
+                let misses = found[n].iter().zip(&fine[n]).map(|(a, b)| (a - b).powi(2));
+                (misses.sum::<f64>() / fine[n].iter().map(|u| u * u).sum::<f64>()).sqrt()
+            })
+        })
+    };
+    let first_order = errors(false, false);
+    for uneven in [false, true] {
+        let found = errors(true, uneven);
+        println!("uneven steps: {uneven}: {found:.6?}, first order {first_order:.6?}");
+        for (found, first_order) in found.iter().zip(&first_order) {
+            let [thickness, velocity] = [0, 1].map(|n| found[n] / first_order[n]);
+            assert!(thickness < 0.5 && velocity < 0.35, "{found:?}");
+        }
+    }
+}

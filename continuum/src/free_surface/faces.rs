@@ -50,6 +50,15 @@ impl Face {
             Face::Slides(_) | Face::Still | Face::Loose => None,
         }
     }
+
+    /// The role of a face that lies on this one.
+    fn lent(self) -> Self {
+        match self {
+            Face::Own(j) | Face::Follows(j) => Face::Follows(j),
+            Face::Still => Face::Still,
+            Face::Slides(_) | Face::Loose => Face::Loose,
+        }
+    }
 }
 
 /// Nothing moves a face.
@@ -63,6 +72,10 @@ pub(super) const THINNEST_LAYER: f64 = 1e-3;
 /// Layers on material that are thinner than this part of a cell move with it. Flow through such a cell jumps by this part
 /// of the difference of two velocities where the layer begins to slide; thinner ones cost iterations.
 const THINNEST_SLIDING: f64 = 0.1;
+
+/// Less than this part of what has landed in the cell below may hang over it: of a face's mass nearly all has landed then,
+/// and it must not fall.
+const HANGING: f64 = 0.1;
 
 /// Roles of cells and faces.
 #[derive(Debug, Clone)]
@@ -127,12 +140,81 @@ impl<const D: usize> Faces<D> {
             for face in 0..topology.faces(component) {
                 if faces.role[component][face] == Face::Loose
                     && let Some(host) = faces.host(topology, fractions, component, face)
+                    && !faces.hangs(topology, fractions, component, face, host)
                 {
                     faces.role[component][face] = Face::Follows(host);
                 }
             }
         }
+        faces.land(topology, fractions);
         faces
+    }
+
+    /// Whether a face would hold material up over a cell that has room for it, by moving with the one below that cell.
+    pub(super) fn hangs(
+        &self,
+        topology: &Topology<D>,
+        fractions: &[f64],
+        component: usize,
+        face: usize,
+        host: usize,
+    ) -> bool {
+        let (axis, downwards) = self.fall();
+        let cells = topology.face_cells[component][face];
+        let (lower, upper) = (cells[downwards], cells[1 - downwards]);
+        component == axis
+            && fractions[upper] > EMPTY.max(HANGING * fractions[lower])
+            && self.own_at(
+                component,
+                topology.face_neighbours[component][face][axis][downwards],
+            ) == Some(host)
+    }
+
+    /// The axis that gravity points along most, and the side it points to (0 low, 1 high).
+    fn fall(&self) -> (usize, usize) {
+        let steeper = |best: usize, axis: usize| {
+            if self.acceleration[axis].abs() > self.acceleration[best].abs() {
+                axis
+            } else {
+                best
+            }
+        };
+        let axis = (0..D).fold(D - 1, steeper);
+        (axis, usize::from(self.acceleration[axis] > 0.0))
+    }
+
+    /// What has landed moves with the face below: its uppermost faces, through which nothing falls and under which nothing can,
+    /// so that a velocity of their own would grow for ever; and faces beside it, which would slide without friction.
+    pub(super) fn land(&mut self, topology: &Topology<D>, fractions: &[f64]) {
+        let (axis, downwards) = self.fall();
+        let lies = |faces: &Self, cell: usize| {
+            let below = topology.cell_faces[cell][axis][downwards];
+            fractions[cell] <= MASSLESS || faces.role[axis][below] != Face::Loose
+        };
+        for component in (0..D).filter(|&component| component != axis) {
+            for face in 0..topology.faces(component) {
+                let cells = topology.face_cells[component][face];
+                let base = topology.face_neighbours[component][face][axis][downwards];
+                if self.role[component][face] == Face::Loose
+                    && base != NONE
+                    && topology.face_mean(component, face, fractions) > MASSLESS
+                    && cells.into_iter().all(|cell| lies(self, cell))
+                {
+                    self.role[component][face] = self.role[component][base].lent();
+                }
+            }
+        }
+        for face in 0..topology.faces(axis) {
+            let cells = topology.face_cells[axis][face];
+            if self.role[axis][face] == Face::Loose
+                && !cells.contains(&NONE)
+                && fractions[cells[downwards]] > MASSLESS
+                && fractions[cells[1 - downwards]] <= EMPTY
+            {
+                let lower = topology.cell_faces[cells[downwards]][axis][downwards];
+                self.role[axis][face] = self.role[axis][lower].lent();
+            }
+        }
     }
 
     /// The role of a face by itself; unknowns get their numbers.

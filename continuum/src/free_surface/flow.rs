@@ -264,7 +264,8 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
     /// Makes one step of at most `limit`. A step that does not converge is halved and tried again.
     ///
     /// # Errors
-    /// [`Error::NotConverged`] when halving does not help.
+    /// [`Error::NotConverged`] when halving does not help, and what the solver refuses; the state is then that of before
+    /// the step, but that from rest the velocity may have its first half of a step.
     pub fn step(&mut self, limit: f64) -> Result<SurfaceStep, Error> {
         let mut record = SurfaceStep::default();
         if self.state.next_step == 0.0 {
@@ -296,7 +297,8 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             }
             let until = self.state.time + dt + 0.5 * next;
             let ahead = (until - self.state.velocity_time).max(LEAST_PUSH * dt);
-            if self.accelerate(ahead, &mut record)? {
+            let outcome = self.accelerate(ahead, &mut record);
+            if matches!(outcome, Ok(true)) {
                 self.state.velocity_time += ahead;
                 self.state.next_step = self.allowed_step(growing_from).min(next);
                 self.state.time += dt;
@@ -306,8 +308,9 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                 record.max_speed = self.max_speed();
                 return Ok(record);
             }
-            record.cuts += 1;
             self.state.clone_from(&self.saved);
+            outcome?;
+            record.cuts += 1;
             dt *= 0.5;
             growing_from = dt;
         }

@@ -79,9 +79,11 @@ impl<'a, const D: usize> Neighbourhood<'a, D> {
         found
     }
 
-    /// Amount of material by which the high side of an axis exceeds the low one.
+    /// Amount of material by which the high side of an axis exceeds the low one. Nothing clings to a ceiling.
     fn excess(&self, axis: usize) -> f64 {
+        let ceiling = axis == D - 1 && self.ends[axis][1];
         (0..stencil(D))
+            .filter(|&place| !(ceiling && step(place, axis) == 2))
             .map(|place| (step(place, axis) as f64 - 1.0) * self.fractions[place])
             .sum()
     }

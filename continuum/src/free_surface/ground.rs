@@ -27,9 +27,11 @@
 pub(crate) mod contact;
 mod cuts;
 pub(crate) mod faces;
+mod foot;
 mod layers;
 mod operators;
 mod points;
+pub(crate) mod settling;
 mod transport;
 
 use serde::{Deserialize, Serialize};
@@ -348,7 +350,12 @@ impl<const D: usize> Ground<D> {
                     *next = topology.cell_neighbours[cell][axis][side];
                 }
             }
-            if D > 2 && most > 0.0 && way(cell, D - 1, 1) >= (1.0 - ALIKE) * most {
+            // In space it goes up where that is as good, and where no one way out is the best: of two alike neither may be
+            // preferred to its mirror image.
+            let alike =
+                sides().filter(|&(axis, side)| way(cell, axis, side) >= (1.0 - ALIKE) * most);
+            let up = way(cell, D - 1, 1);
+            if D > 2 && up > 0.0 && (up >= (1.0 - ALIKE) * most || alike.count() > 1) {
                 *next = topology.cell_neighbours[cell][D - 1][1];
             }
         }

@@ -26,6 +26,8 @@ use crate::wall_friction::{PointLaw, SideWalls};
 const NEAREST_SURFACE: f64 = 0.005;
 /// Smallest θ in the extrapolation of pressure beyond the surface.
 pub(super) const NEAREST_EXTRAPOLATION: f64 = 0.25;
+/// An axis along which gravity has less than this part of all of it lies across upright faces.
+const UPRIGHT: f64 = 1e-9;
 /// Ways from a cell to those beside it, in space.
 const MOST_WAYS: usize = 6;
 /// Cells with less material have no quadrature points.
@@ -55,6 +57,8 @@ pub(crate) struct Material<'a, const D: usize = DIMENSIONS, const C: usize = COM
     pub outside: Option<&'a Outside<D, C>>,
     /// Where the tractions of walls are kept along which material slides.
     pub sliding: &'a SlidingPlaces<D>,
+    /// Whether its friction is at least 1, so that a free upright face stands.
+    pub stands: bool,
 }
 
 /// The operators, and the place of each quadrature point on the grid: cell times [`points_of`] plus
@@ -466,6 +470,11 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
     }
 
     /// The pressure of the active cell along a way, continued through p = 0 at the surface.
+    ///
+    /// On a free surface p is the stress across it, σ_nn = s_nn − p = 0, and |s| ≤ μ p leaves nothing but p = 0 where
+    /// μ < 1. With μ ≥ 1 the upright face of a column that stands bears p = s = ρ g z/2, the same on the face as behind
+    /// it, so there the pressure goes on across faces along gravity as it is: through p = 0 the last cells behind the face
+    /// would bear no more than half of it, and corners stand with μ ≥ 2 only.
     fn extrapolated(
         &self,
         cell: usize,
@@ -473,6 +482,13 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         nearest: f64,
     ) -> (usize, f64) {
         let inner = self.topology.cell_neighbours[cell][axis][side];
+        let most = self
+            .acceleration
+            .iter()
+            .fold(0.0_f64, |m, g| m.max(g.abs()));
+        if self.stands && self.acceleration[axis].abs() <= UPRIGHT * most {
+            return (self.faces.pressure[inner], 1.0);
+        }
         let distance = self
             .surface_distance(inner, cell, axis, 1 - side)
             .max(nearest);

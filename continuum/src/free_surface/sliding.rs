@@ -75,6 +75,13 @@ impl<const D: usize> SlidingPlaces<D> {
             self.end + cell
         }
     }
+
+    /// Where the friction of a thin layer on ground is kept, by the component of its unknown and the cell above its face.
+    /// At a corner of that cell the stress of a material point that was there before would be taken for the layer's, and
+    /// none of the corners is as near to the layer's mirror image as to the layer.
+    pub(super) fn of_layer(&self, cells: usize, component: usize, cell: usize) -> usize {
+        self.on_ground(cells, cells) + cell * D + component
+    }
 }
 
 impl<const D: usize, const C: usize> Material<'_, D, C> {

@@ -13,6 +13,7 @@
 use super::faces::ACTIVE;
 use super::fraction::{reconstruct, volume_in};
 use super::ground::Ground;
+use super::ground::settling::Settling;
 use super::open_ends::Inflow;
 use super::plane::Plane;
 use super::topology::{NONE, Topology};
@@ -40,6 +41,7 @@ pub(crate) struct Transport<const D: usize = DIMENSIONS> {
     next: Vec<f64>,
     /// Matter and ground together.
     filled: Vec<f64>,
+    settling: Settling,
     /// Velocities that are carried, before the step.
     start: Velocity<D>,
     /// Momentum of each velocity of a component.
@@ -92,6 +94,7 @@ impl<const D: usize> Default for Transport<D> {
             dilates: Vec::new(),
             next: Vec::new(),
             filled: Vec::new(),
+            settling: Settling::default(),
             start: components(),
             momentum: Vec::new(),
             before: (Vec::new(), components()),
@@ -198,7 +201,7 @@ impl<const D: usize> Transport<D> {
             std::mem::swap(fractions, &mut self.next);
         }
         if let Some(ground) = motion.ground {
-            ground.settle(motion.topology, fractions);
+            ground.settle(motion.topology, fractions, &mut self.settling);
         }
     }
 

@@ -107,10 +107,15 @@ const WARM_ITERATIONS: usize = 20;
 /// iteratively: a tighter one saves no iteration.
 const NEWTON_TOLERANCE: f64 = 1e-3;
 
+/// Residual of the first linear system of an attempt in a plane, over [`PrimalDualOptions::linear_tolerance`]: what the law
+/// bends by leaves more.
+const FIRST_LOOSE: f64 = 10.0;
 /// Residual of a linear system, as a part of what the nonlinear ones may be over what they are.
 const FORCING: f64 = 0.3;
 /// Loosest residual of a linear system over [`PrimalDualOptions::linear_tolerance`].
 const LOOSEST: f64 = 50.0;
+/// A linear solution that leaves more than this is hardly one.
+const WEAKEST: f64 = 0.3;
 
 /// Most parts that are solved between two iterations of the whole: what is left of one lies beside it.
 const MOST_PARTS: usize = 4;
@@ -240,6 +245,9 @@ impl<const C: usize> PrimalDual<C> {
         self.evaluated_at = f64::NAN;
         self.cut.fill(false);
         let mut floor = strategy.first_floor;
+        // The pressure that a stress was found with may not be that which is interpolated now.
+        self.evaluate(problem, floor);
+        self.bring_stress_to_threshold();
         // In space mirrored flows are to stay alike, to which loose systems and choices do not contribute.
         let keeps = D == 2;
         let solves_parts = strategy.solves_parts
@@ -249,6 +257,9 @@ impl<const C: usize> PrimalDual<C> {
         // Floor with which the factors were made. Those of an earlier step would not be there after a restart.
         let mut floor_of_factors = f64::NAN;
         let mut tolerance = self.options.linear_tolerance;
+        if keeps {
+            tolerance = (FIRST_LOOSE * tolerance).min(WEAKEST);
+        }
         // Points whose law was missed when a part could not be solved: there is hope again when they are fewer.
         let mut in_vain = usize::MAX;
         for iteration in 0..strategy.max_iterations {
@@ -323,7 +334,10 @@ impl<const C: usize> PrimalDual<C> {
     fn forcing(&self, allowed: &Residuals, found: &Residuals) -> f64 {
         let left = 1.0 / found.over(allowed);
         let least = self.options.linear_tolerance;
-        (FORCING * left).max(least).min(LOOSEST * least)
+        (FORCING * left)
+            .max(least)
+            .min(LOOSEST * least)
+            .min(WEAKEST)
     }
 
     /// ∂s/∂γ = κ/γ_ε 1 + (κ_γ γ − s) ⊗ γ/γ_ε² and ∂s/∂p = κ_p γ/γ_ε, with γ_ε = √(|γ|² + ε²).
@@ -494,6 +508,11 @@ impl<const C: usize> PrimalDual<C> {
         }
         self.evaluated_at = f64::NAN;
         self.evaluate(problem, floor);
+        self.bring_stress_to_threshold();
+    }
+
+    /// Brings stresses above the threshold of the evaluated state back onto it: beyond, ∂s/∂γ is not positive.
+    fn bring_stress_to_threshold(&mut self) {
         for (evaluation, s) in self.evaluations.iter().zip(&mut self.trial.s) {
             let threshold = evaluation.threshold;
             let size = strain_rate_norm(*s);

@@ -59,6 +59,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             acceleration,
             outside: self.outside.as_ref(),
             sliding: &self.sliding,
+            stands: self.stands(),
         };
         let Operators {
             discretisation,
@@ -127,6 +128,12 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             self.scatter(&faces, &places, dt);
         }
         Ok(report.converged)
+    }
+
+    /// Whether the friction of matter at rest is at least 1.
+    fn stands(&self) -> bool {
+        let [one, two] = [1.0, 2.0].map(|p| self.rheology.threshold(0.0, p).stress);
+        two - one >= 1.0
     }
 
     /// Without pressure and stress, and if gravity alone lets no cell shrink, free fall is the exact

@@ -32,7 +32,7 @@ const LIGHTEST: f64 = 0.25;
 const UNKNOWN: f64 = f64::INFINITY;
 
 /// What a step knows of the one before. Where that is nothing the step is of first order.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub struct History<const D: usize = DIMENSIONS, const C: usize = COMPONENTS> {
     /// What advection adds to the velocity of each face from the time of the fractions to that of the velocity; may be
     /// empty.
@@ -43,6 +43,28 @@ pub struct History<const D: usize = DIMENSIONS, const C: usize = COMPONENTS> {
     pub friction_change: Vec<[f64; C]>,
     /// Time by which the velocity last moved on.
     pub push: f64,
+}
+
+impl<const D: usize, const C: usize> Clone for History<D, C> {
+    fn clone(&self) -> Self {
+        let mut copy = Self::default();
+        copy.clone_from(self);
+        copy
+    }
+
+    /// Into the memory that is there.
+    fn clone_from(&mut self, other: &Self) {
+        let Self {
+            lead,
+            pressure,
+            friction_change,
+            push,
+        } = other;
+        self.lead.clone_from(lead);
+        self.pressure.clone_from(pressure);
+        self.friction_change.clone_from(friction_change);
+        self.push = *push;
+    }
 }
 
 impl<const D: usize, const C: usize> Default for History<D, C> {

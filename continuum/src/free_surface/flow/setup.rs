@@ -4,7 +4,7 @@
 use super::{INACTIVE, SpaceFlow, Spent, SurfaceFlow, SurfaceOptions, SurfaceState};
 use crate::discretisation::COMPONENTS;
 use crate::error::{Error, require};
-use crate::free_surface::ground::{Contact, Ground, Terrain};
+use crate::free_surface::ground::{Ground, Terrain};
 use crate::free_surface::open_ends::{Inflow, can_open};
 use crate::free_surface::operators::POINTS;
 use crate::free_surface::sliding::SlidingPlaces;
@@ -157,11 +157,9 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                 *fraction = *free;
             }
         }
-        if let Contact::Coulomb(_) = terrain.contact {
-            let cells = topology.cells();
-            let points = flow.sliding.on_ground(cells, cells);
-            flow.state.stress.resize(points, [0.0; C]);
-        }
+        let cells = topology.cells();
+        let places = flow.sliding.of_layer(cells, 0, cells);
+        flow.state.stress.resize(places, [0.0; C]);
         flow.topology = topology;
         flow.set_weight_for_pressure();
         flow.saved.clone_from(&flow.state);

@@ -16,7 +16,8 @@ use crate::yield_step::{PrimalDualOptions, Residuals};
 #[serde(deny_unknown_fields, default)]
 pub struct SurfaceOptions {
     /// Largest Δt Σ |u|/h over the axes, at most 1. Above ½ material moves in two parts with one
-    /// velocity.
+    /// velocity. At 0.9 plane columns come to rest with their fronts within 0.25 % and their profiles within 0.2 % of the area
+    /// of those at 0.1125.
     pub courant: f64,
     /// Largest time step.
     pub largest_step: f64,
@@ -52,7 +53,20 @@ impl Default for SurfaceOptions {
     }
 }
 
+/// Largest Courant number of flows of first order in the time step.
+const FIRST_ORDER_COURANT: f64 = 0.45;
+
 impl SurfaceOptions {
+    /// The same for a flow whose state is changed from outside step by step: nothing is taken from the step before, and the
+    /// steps are as short as the larger error then asks.
+    pub fn of_first_order(self) -> Self {
+        Self {
+            second_order: false,
+            courant: self.courant.min(FIRST_ORDER_COURANT),
+            ..self
+        }
+    }
+
     /// Refuses settings that cannot work.
     ///
     /// # Errors
@@ -101,7 +115,7 @@ pub struct SurfaceStep {
 }
 
 /// State of a flow with a moving surface, on all of its grid.
-#[derive(Debug, Clone, PartialEq)]
+#[derive(Debug, PartialEq)]
 pub struct SurfaceState<const D: usize = DIMENSIONS, const C: usize = COMPONENTS> {
     /// Fraction of each cell that is filled.
     pub fractions: Vec<f64>,
@@ -110,7 +124,7 @@ pub struct SurfaceState<const D: usize = DIMENSIONS, const C: usize = COMPONENTS
     /// Pressure of each cell, negative where there is none.
     pub pressure: Vec<f64>,
     /// Stress at each corner of each cell, then the traction of side walls there if there are any, then
-    /// that of ground in each cell under Coulomb friction.
+    /// that of ground in each cell under Coulomb friction, then the friction of thin layers on ground.
     pub stress: Vec<[f64; C]>,
     /// What the next step takes from the last one.
     pub history: History<D, C>,
@@ -124,6 +138,40 @@ pub struct SurfaceState<const D: usize = DIMENSIONS, const C: usize = COMPONENTS
     pub passed: [f64; 2],
     /// Steps made.
     pub steps: usize,
+}
+
+impl<const D: usize, const C: usize> Clone for SurfaceState<D, C> {
+    fn clone(&self) -> Self {
+        let mut copy = Self::default();
+        copy.clone_from(self);
+        copy
+    }
+
+    /// Into the memory that is there: every step keeps what it began with.
+    fn clone_from(&mut self, other: &Self) {
+        let Self {
+            fractions,
+            velocity,
+            pressure,
+            stress,
+            history,
+            time,
+            velocity_time,
+            next_step,
+            passed,
+            steps,
+        } = other;
+        self.fractions.clone_from(fractions);
+        self.velocity.clone_from(velocity);
+        self.pressure.clone_from(pressure);
+        self.stress.clone_from(stress);
+        self.history.clone_from(history);
+        self.time = *time;
+        self.velocity_time = *velocity_time;
+        self.next_step = *next_step;
+        self.passed = *passed;
+        self.steps = *steps;
+    }
 }
 
 impl<const D: usize, const C: usize> Default for SurfaceState<D, C> {

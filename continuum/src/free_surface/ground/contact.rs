@@ -244,14 +244,14 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         }
         let p = self.faces.pressure[ground.master[cell]];
         if p == NONE {
-            let slides = |&j: &usize| self.faces.lies_on[j] != NONE;
-            point.pressure_offset = 0.5
-                * if point.velocities().iter().any(slides) {
-                    let weight = weight_onto(&self.acceleration, D - 1, 0);
-                    weight * self.fractions[cell] * self.grid.axes()[D - 1].spacing()
-                } else {
-                    self.layer_weight(ground, cell)
-                };
+            // On ground a layer may cross rows of cells; elsewhere it lies on what has a pressure of its own.
+            let weight = if ground.wall[cell] == [0.0; D] {
+                let thickness = self.fractions[cell] * self.grid.axes()[D - 1].spacing();
+                weight_onto(&self.acceleration, D - 1, 0) * thickness
+            } else {
+                self.layer_weight(ground, cell)
+            };
+            point.pressure_offset = 0.5 * weight;
         } else {
             point.add_pressure(p, 1.0);
         }

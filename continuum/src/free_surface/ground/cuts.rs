@@ -18,6 +18,10 @@ pub(super) type Sheet = [f64; MOST_PARTS];
 /// Ground whose normal has less than this of an axis, over the most, does not lean to it.
 const UPRIGHT: f64 = 1e-9;
 
+/// A smaller surface, over the area of a face, is none: the ground touches a corner of the cell, to round-off, and the
+/// direction of the surface there is a matter of round-off, too.
+const SMALLEST_WALL: f64 = 3e-6;
+
 /// The parts of cells, of faces and of the sheets through the middles of cells.
 pub(super) struct Cuts<const D: usize> {
     /// Free part of each part of each cell, in cells.
@@ -142,6 +146,13 @@ fn walls<const D: usize>(lines: &GridLines<D>, whole: &CutCells<D>) -> Vec<[f64;
         .map(|cell| match whole.wall(unflatten(cell, lines.cells)) {
             Some(wall) => wall.area_vector.map(|a| a * area),
             None => [0.0; D],
+        })
+        .map(|wall| {
+            if wall.iter().all(|a| a.abs() < SMALLEST_WALL) {
+                [0.0; D]
+            } else {
+                wall
+            }
         })
         .collect()
 }

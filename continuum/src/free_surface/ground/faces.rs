@@ -70,7 +70,11 @@ pub(crate) fn faces_over<const D: usize>(
             match *waits {
                 Waiting::No => {}
                 Waiting::Host { else_still } => {
-                    if let Some(host) = faces.host(topology, fractions, component, face) {
+                    let host = faces.host(topology, fractions, component, face);
+                    if let Some(host) = host
+                        && !(ground.open[component][face]
+                            && faces.hangs(topology, fractions, component, face, host))
+                    {
                         faces.role[component][face] = Face::Follows(host);
                         if ground.touches(topology, component, face) {
                             shares[component][face] = if faces.is_thin[host] {
@@ -104,6 +108,7 @@ pub(crate) fn faces_over<const D: usize>(
         faces.role[own.0][own.1] = faces.take(own.0, own.1, false, NONE);
     }
     faces.shares = Some(shares);
+    faces.land(topology, fractions);
     faces
 }
 

@@ -14,7 +14,7 @@
 use super::{Contact, Ground, unit};
 use crate::discretisation::{Parts, QuadraturePoint};
 use crate::free_surface::faces::{Face, weight_onto};
-use crate::free_surface::operators::{Material, points_of};
+use crate::free_surface::operators::Material;
 use crate::free_surface::topology::{NONE, Topology};
 use crate::strain::shear_row;
 use crate::wall_friction::PointLaw;
@@ -239,7 +239,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             };
             let [_, high] = self.topology.face_cells[component][face];
             parts.points.push(point);
-            places.push(high * points_of(D) + component);
+            places.push(self.sliding.of_layer(self.fractions.len(), component, high));
         }
     }
 

@@ -38,7 +38,11 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         self.add_pressures(ground, &total, &mut parts);
         self.add_pressure_on_layers(&total, &mut parts);
         for (cell, &fraction) in self.fractions.iter().enumerate() {
-            if fraction > EMPTY && ground.free[cell] > 0.0 && !self.has_layer(cell) {
+            if fraction <= EMPTY || ground.free[cell] == 0.0 {
+                continue;
+            }
+            self.add_rubbing(ground, cell, &mut parts.points, &mut places);
+            if !self.has_layer(cell) {
                 self.add_cell(ground, cell, &mut parts.points, &mut places);
                 if let Contact::Coulomb(friction) = ground.contact
                     && let Some(point) = self.sliding(ground, friction, cell)

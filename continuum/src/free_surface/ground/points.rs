@@ -1,8 +1,7 @@
 //! Strain rates at the quadrature points of material over ground, by Gauss' theorem on what is free of it.
 
-use super::contact::Interpolation;
+use super::Ground;
 use super::cuts::MOST_PARTS;
-use super::{Ground, unit};
 use crate::discretisation::QuadraturePoint;
 use crate::free_surface::faces::Face;
 use crate::free_surface::fraction::volume_in;
@@ -16,11 +15,11 @@ const ALONG_AXIS: f64 = 1e-9;
 const STRETCHING_ON_GROUND: f64 = 0.5;
 
 /// The cells around a corner of one of them, by its sides that are crossed on the way there: one bit for each axis.
-type Around = [usize; MOST_PARTS];
+pub(super) type Around = [usize; MOST_PARTS];
 
 /// Cells around a corner, and one bit for each axis across which they are mirror images.
-struct Mirrored {
-    cells: Around,
+pub(super) struct Mirrored {
+    pub cells: Around,
     axes: usize,
 }
 
@@ -38,7 +37,7 @@ impl Mirrored {
 }
 
 /// The sides of a part of a cell.
-fn sides_of<const D: usize>(corner: usize) -> [usize; D] {
+pub(super) fn sides_of<const D: usize>(corner: usize) -> [usize; D] {
     std::array::from_fn(|axis| corner >> axis & 1)
 }
 
@@ -57,6 +56,28 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         }
         let all = volume_in(1.0, self.planes[cell].as_ref(), low, high);
         (all - (1.0 / points_of(D) as f64 - free)).clamp(0.0, free)
+    }
+
+    /// Adds the friction of side walls on a cell, a point for each corner. Whatever lies there rubs along its sides with what
+    /// there is of it, where the traction of the ground acts on all of the ground's surface, and thin layers do, too.
+    pub(super) fn add_rubbing<const V: usize>(
+        &self,
+        ground: &Ground<D>,
+        cell: usize,
+        points: &mut Vec<QuadraturePoint<C, V>>,
+        places: &mut Vec<usize>,
+    ) {
+        let Some(walls) = self.side_walls else { return };
+        for corner in 0..points_of(D) {
+            let beside = self.material_in_part(ground, cell, corner);
+            if beside > 0.0
+                && let Some(point) =
+                    self.rubbing_over(ground, walls, cell, sides_of::<D>(corner), beside)
+            {
+                points.push(point);
+                places.push((self.fractions.len() + cell) * points_of(D) + corner);
+            }
+        }
     }
 
     /// Adds the quadrature points of one cell, one for each corner.
@@ -85,14 +106,6 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             };
             if volume <= 0.0 {
                 continue;
-            }
-            // A layer rubs along its sides with what there is of it.
-            let beside = if layer.is_some() { filled() } else { volume };
-            if let Some(walls) = self.side_walls
-                && let Some(point) = self.rubbing_over(ground, walls, cell, side, beside)
-            {
-                points.push(point);
-                places.push((self.fractions.len() + cell) * points_of(D) + corner);
             }
             let mut point = QuadraturePoint::new(volume * self.grid.cell_volume());
             for (axis, rows) in rows.iter().enumerate() {
@@ -138,87 +151,6 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 places.push(cell * points_of(D) + corner);
             }
         }
-    }
-
-    /// The pressure at a corner, or on the ground there, which bears a press: interpolated between the cells around it, and of
-    /// a layer in which one cell has a pressure its weight.
-    fn pressure_at_corner(
-        &self,
-        ground: &Ground<D>,
-        corner: usize,
-        around: &Mirrored,
-        press: Option<f64>,
-    ) -> Interpolation {
-        let mut pressure = Interpolation::default();
-        let foot = if press.is_some() {
-            foot_of::<D>(ground, around.cells[0], corner)
-        } else {
-            [0.0; D]
-        };
-        let share = |place: usize| {
-            (0..D).fold(1.0, |share, axis| {
-                // Towards the middle of the cell at that place.
-                let is_low = (corner ^ place) >> axis & 1 == 1;
-                share * (0.5 + if is_low { -foot[axis] } else { foot[axis] })
-            })
-        };
-        let upwards = 1 << (D - 1);
-        for column in 0..upwards {
-            let high = column | corner & upwards;
-            let low = high ^ upwards;
-            let depth = press.filter(|press| *press > 0.0).and_then(|press| {
-                Some(press * self.depth_of_one_cell(around.cells[high], around.cells[low])?)
-            });
-            if let Some(weight) = depth {
-                pressure.known += (share(low) + share(high)) * weight;
-                continue;
-            }
-            for place in [low, high] {
-                let there = self.pressure_over(ground, place, &around.cells);
-                pressure.add_all(&there, share(place));
-            }
-        }
-        pressure
-    }
-
-    /// What matter weighs on the ground in a cell per height of its column, |g·n| n_z, if it sticks there to ground whose
-    /// normal n leans upwards most, in it or on its face across an axis; else nothing.
-    fn press_on_ground(&self, ground: &Ground<D>, cell: usize, across: Option<usize>) -> f64 {
-        let last = D - 1;
-        let mut normal = unit(ground.wall[cell]);
-        if normal == [0.0; D] && across == Some(last) {
-            normal[last] = 1.0;
-        }
-        let leans_up = normal.iter().all(|n| n.abs() <= normal[last]);
-        if ground.contact.slides() || !leans_up {
-            return 0.0;
-        }
-        let pairs = self.acceleration.iter().zip(normal);
-        let towards = pairs.fold(0.0, |sum, (g, n)| sum - g * n);
-        towards.max(0.0) * normal[last]
-    }
-
-    /// Height of the matter in a column of which a cell is the only one that has a pressure: the ground lies in it or below it.
-    /// See [`Self::weight_of_one_cell`], on a floor.
-    fn depth_of_one_cell(&self, cell: usize, below: usize) -> Option<f64> {
-        let last = D - 1;
-        let has_own = |cell: usize| cell != NONE && self.faces.pressure[cell] != NONE;
-        if !has_own(cell) || has_own(below) {
-            return None;
-        }
-        let above = self.topology.cell_neighbours[cell][last][1];
-        if above == NONE || has_own(above) {
-            return None;
-        }
-        let filled = |cell: usize| {
-            if cell == NONE {
-                0.0
-            } else {
-                self.fractions[cell]
-            }
-        };
-        let depth = filled(below) + filled(cell) + filled(above);
-        Some(depth * self.grid.axes()[last].spacing())
     }
 
     /// The same cells with mirror images beyond smooth walls of the grid, which in space are planes of symmetry.
@@ -399,22 +331,6 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             }
         }
     }
-}
-
-/// Where the ground lies next to a corner of a cell that it cuts, in cells from the corner. There the traction acts: under
-/// the pressure at the corner, up to half a cell deeper or less deep, a heap a few cells thick over level ground would end
-/// short or run on.
-fn foot_of<const D: usize>(ground: &Ground<D>, cell: usize, corner: usize) -> [f64; D] {
-    let Some(plane) = &ground.planes[cell] else {
-        return [0.0; D];
-    };
-    let mut at = [0.0; 3];
-    for (axis, side) in sides_of::<D>(corner).into_iter().enumerate() {
-        at[axis] = side as f64;
-    }
-    let square: f64 = plane.normal.iter().map(|n| n * n).sum();
-    let depth = plane.depth(at) / square;
-    std::array::from_fn(|axis| (depth * plane.normal[axis]).clamp(-0.5, 0.5))
 }
 
 /// The horizontal direction that the ground leans to in the cells that share a cell's pressure, in space; none where it is

@@ -43,11 +43,8 @@ pub fn bed(
         fractions,
         law.in_units(units),
         [0.0, 0.0, -1.0],
-        SurfaceOptions {
-            // The copy is made anew at every exchange.
-            second_order: false,
-            ..*options
-        },
+        // The copy is made anew at every exchange.
+        options.of_first_order(),
     )?)
 }
 

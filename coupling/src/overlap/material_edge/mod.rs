@@ -246,9 +246,8 @@ impl MaterialEdge {
         let loads = (spec.settings.exchange_time / load_time).round().max(1.0);
         let column = spec.column(mass);
         let exchange = loads * load_time / (column.height / column.gravity).sqrt();
-        let mut options = spec.options;
         // The copy is made anew at every exchange.
-        options.second_order = false;
+        let mut options = spec.options.of_first_order();
         if exchange < NEARLY * options.largest_step {
             options.largest_step = options.largest_step.max(copy::ROUNDED * exchange);
         }
