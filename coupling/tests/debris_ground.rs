@@ -41,9 +41,8 @@ fn bed(ground: &Profile, interval: f64) -> Collapse {
         overhang_degrees: 0.0,
     };
     let options = SurfaceOptions {
-        second_order: false,
         largest_step: 1.01 * interval,
-        ..SurfaceOptions::default()
+        ..SurfaceOptions::default().of_first_order()
     };
     let ground = CollapseGround {
         profile: ground.clone(),

@@ -77,9 +77,8 @@ impl Runout {
         // Velocities that are changed from outside have no second order.
         let options = if interval > 0.0 {
             SurfaceOptions {
-                second_order: false,
                 largest_step: WHOLE * interval / case.units().time(),
-                ..SurfaceOptions::default()
+                ..SurfaceOptions::default().of_first_order()
             }
         } else {
             SurfaceOptions::default()
