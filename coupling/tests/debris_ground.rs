@@ -181,7 +181,7 @@ fn fall(reacts: bool) -> Fall {
     let steps = simulation.steps_done();
     let fallen = Vector3::z() * -mass * simulation.kick_time(steps);
     let own = momentum(&simulation) - before - fallen;
-    let fastest = held(&simulation).iter().map(|g| g.velocity.norm());
+    let fastest = held(&simulation).into_iter().map(|g| g.velocity.norm());
     Fall {
         grains: [own.x, own.z],
         continuum: gained,
