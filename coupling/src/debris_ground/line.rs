@@ -85,6 +85,19 @@ impl SurfaceLine {
             let [x, z] = self.points[i];
             [x, z + self.rise[i] * later]
         };
+        // Height over the line, which has one at each place, says the side: beside a ridge both segments, prolonged, may not.
+        let right = self
+            .points
+            .partition_point(|p| p[0] <= x)
+            .clamp(1, self.points.len().max(2) - 1);
+        let over = match self.points.get(right) {
+            Some(_) => {
+                let (a, b) = (point(right - 1), point(right));
+                let share = ((x - a[0]) / (b[0] - a[0])).clamp(0.0, 1.0);
+                z - (a[1] + share * (b[1] - a[1]))
+            }
+            None => z,
+        };
         let mut best: Option<(f64, Near)> = None;
         for i in first.saturating_sub(1)..last.min(self.points.len().saturating_sub(1)) {
             if !(self.covered[i] || self.covered[i + 1]) {
@@ -101,11 +114,9 @@ impl SurfaceLine {
             if best.as_ref().is_some_and(|(least, _)| *least <= far) {
                 continue;
             }
-            // Beside an edge of the line the side is that of the nearer segment: the line has one height at each place.
             let length = square.sqrt();
             let mut normal = [-along[1] / length, along[0] / length];
-            let height = apart[0] * normal[0] + apart[1] * normal[1];
-            let distance = far.sqrt().copysign(height);
+            let distance = far.sqrt().copysign(over);
             if t != way && far > 0.0 {
                 normal = apart.map(|c| c / distance);
             }
@@ -181,6 +192,33 @@ mod tests {
         assert!((later.distance - 1.0).abs() < 1e-15 && (later.velocity[1] - 0.5).abs() < 1e-15);
         assert!((later.velocity[0] - 1.0).abs() < 1e-15);
         assert_eq!(roof().near([9.0, 0.1], 0.5, 0.0), None);
+    }
+
+    #[test]
+    fn a_bluff_has_its_sides() {
+        let bluff = SurfaceLine {
+            points: vec![[0.0, 0.0], [1.0, 0.3], [2.0, 0.6], [3.0, -5.4], [4.0, -5.4]],
+            covered: vec![true; 5],
+            velocity: vec![[0.0; 2]; 5],
+            rise: vec![0.0; 5],
+        };
+        let beside = bluff.near([4.5, 1.4], 8.0, 0.0).unwrap();
+        assert!(beside.distance > 0.0, "{beside:?}");
+        for i in 0..60 {
+            for k in 0..60 {
+                let at = [0.5 + 0.05 * f64::from(i), -7.0 + 0.2 * f64::from(k)];
+                let share = |a: [f64; 2], b: [f64; 2]| a[1] + (at[0] - a[0]) * (b[1] - a[1]);
+                let left = (at[0] as usize).min(3);
+                let line = share(bluff.points[left], bluff.points[left + 1]);
+                let near = bluff.near(at, 8.0, 0.0).unwrap();
+                let outside = at[1] - line;
+                assert!(near.distance * outside >= 0.0, "{at:?} {near:?}");
+                // The normal leads from the place of the line to the one asked about, or away from it below.
+                let apart = [at[0] - near.place[0], at[1] - near.place[1]];
+                let off = [0, 1].map(|c| apart[c] - near.distance * near.normal[c]);
+                assert!(off[0].hypot(off[1]) < 1e-12 && near.normal.iter().all(|n| n.is_finite()));
+            }
+        }
     }
 
     #[test]
