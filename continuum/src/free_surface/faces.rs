@@ -163,7 +163,7 @@ impl<const D: usize> Faces<D> {
         let cells = topology.face_cells[component][face];
         let (lower, upper) = (cells[downwards], cells[1 - downwards]);
         component == axis
-            && fractions[upper] > EMPTY.max(HANGING * fractions[lower])
+            && may_fall(fractions, lower, upper)
             && self.own_at(
                 component,
                 topology.face_neighbours[component][face][axis][downwards],
@@ -183,7 +183,7 @@ impl<const D: usize> Faces<D> {
         (axis, usize::from(self.acceleration[axis] > 0.0))
     }
 
-    /// What has landed moves with the face below: its uppermost faces, through which nothing falls and under which nothing can,
+    /// What has landed moves with the face below: its uppermost faces, through which hardly anything falls and under which nothing can,
     /// so that a velocity of their own would grow for ever; and faces beside it, which would slide without friction.
     pub(super) fn land(&mut self, topology: &Topology<D>, fractions: &[f64]) {
         let (axis, downwards) = self.fall();
@@ -209,7 +209,7 @@ impl<const D: usize> Faces<D> {
             if self.role[axis][face] == Face::Loose
                 && !cells.contains(&NONE)
                 && fractions[cells[downwards]] > MASSLESS
-                && fractions[cells[1 - downwards]] <= EMPTY
+                && !may_fall(fractions, cells[downwards], cells[1 - downwards])
             {
                 let lower = topology.cell_faces[cells[downwards]][axis][downwards];
                 self.role[axis][face] = self.role[axis][lower].lent();
@@ -525,6 +525,11 @@ fn lies_on_wall<const D: usize>(
         let other = topology.face_cells[component][face][1 - side];
         topology.cell_neighbours[cell][component][side] == NONE && fractions[other] <= empty
     })
+}
+
+/// Whether so much lies over what has landed in a cell that it falls.
+fn may_fall(fractions: &[f64], lower: usize, upper: usize) -> bool {
+    fractions[upper] > EMPTY.max(HANGING * fractions[lower])
 }
 
 /// Gravity normal to a wall on one side of an axis, positive towards the wall.
