@@ -55,9 +55,10 @@ impl<const C: usize> Clone for FlowState<C> {
 
     /// Into the memory that is there.
     fn clone_from(&mut self, other: &Self) {
-        self.u.clone_from(&other.u);
-        self.p.clone_from(&other.p);
-        self.s.clone_from(&other.s);
+        let Self { u, p, s } = other;
+        self.u.clone_from(u);
+        self.p.clone_from(p);
+        self.s.clone_from(s);
     }
 }
 

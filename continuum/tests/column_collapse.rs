@@ -82,6 +82,7 @@ fn friction_above_one_holds_a_column_up() {
         (1.05, 2.0, 104, 0.02),
         (1.5, 2.0, 96, 0.02),
         (2.0, 2.0, 96, 0.02),
+        (2.0, 2.0, 192, 1e-6),
         (2.0, 6.0, 192, 0.02),
     ] {
         let standing = CollapseCase {

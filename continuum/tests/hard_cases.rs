@@ -184,7 +184,8 @@ fn what_splashes_up_a_wall_comes_to_rest() {
 }
 
 /// On a slope of 4 : 5 it piles up there, and spray rains on it for a while. Nothing hangs in the air over a cell with room for
-/// it, as 0.39 of a cell did over 0.003, and nothing falls for ever.
+/// it, as 0.39 of a cell did over 0.003, and nothing falls faster than from the height of 2.8 H that spray came to (5.3 √(gH)
+/// and more with time, where what had landed fell for ever).
 #[test]
 fn spray_comes_down_on_what_lies() {
     let ground = CollapseGround {
@@ -205,7 +206,7 @@ fn spray_comes_down_on_what_lies() {
         .map(|cell| fractions[cell])
         .fold(0.0, f64::max);
     println!("speed {last:.3}, hanging {hanging:.3e}");
-    assert!(last < 0.5 && hanging < 0.05);
+    assert!(last < 2.4 && hanging < 0.05);
 }
 
 fn against_the_wall(overhang_degrees: f64) -> CollapseCase {

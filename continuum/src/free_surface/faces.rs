@@ -50,15 +50,6 @@ impl Face {
             Face::Slides(_) | Face::Still | Face::Loose => None,
         }
     }
-
-    /// The role of a face that lies on this one.
-    fn lent(self) -> Self {
-        match self {
-            Face::Own(j) | Face::Follows(j) => Face::Follows(j),
-            Face::Still => Face::Still,
-            Face::Slides(_) | Face::Loose => Face::Loose,
-        }
-    }
 }
 
 /// Nothing moves a face.
@@ -163,7 +154,8 @@ impl<const D: usize> Faces<D> {
         let cells = topology.face_cells[component][face];
         let (lower, upper) = (cells[downwards], cells[1 - downwards]);
         component == axis
-            && fractions[upper] > EMPTY.max(HANGING * fractions[lower])
+            && !cells.contains(&NONE)
+            && may_fall(fractions, lower, upper)
             && self.own_at(
                 component,
                 topology.face_neighbours[component][face][axis][downwards],
@@ -183,10 +175,26 @@ impl<const D: usize> Faces<D> {
         (axis, usize::from(self.acceleration[axis] > 0.0))
     }
 
-    /// What has landed moves with the face below: its uppermost faces, through which nothing falls and under which nothing can,
-    /// so that a velocity of their own would grow for ever; and faces beside it, which would slide without friction.
+    /// What has landed moves with the face below: its uppermost faces, through which hardly anything falls and under which
+    /// nothing can, so that a velocity of their own would grow for ever; then faces beside it, which would slide without
+    /// friction.
     pub(super) fn land(&mut self, topology: &Topology<D>, fractions: &[f64]) {
         let (axis, downwards) = self.fall();
+        for face in 0..topology.faces(axis) {
+            let cells = topology.face_cells[axis][face];
+            if self.role[axis][face] == Face::Loose
+                && !cells.contains(&NONE)
+                && fractions[cells[downwards]] > MASSLESS
+                && !may_fall(fractions, cells[downwards], cells[1 - downwards])
+            {
+                let lower = topology.cell_faces[cells[downwards]][axis][downwards];
+                if self.role[axis][lower] == Face::Still {
+                    self.role[axis][face] = Face::Still;
+                } else {
+                    self.lend(axis, lower, face);
+                }
+            }
+        }
         let lies = |faces: &Self, cell: usize| {
             let below = topology.cell_faces[cell][axis][downwards];
             fractions[cell] <= MASSLESS || faces.role[axis][below] != Face::Loose
@@ -200,19 +208,18 @@ impl<const D: usize> Faces<D> {
                     && topology.face_mean(component, face, fractions) > MASSLESS
                     && cells.into_iter().all(|cell| lies(self, cell))
                 {
-                    self.role[component][face] = self.role[component][base].lent();
+                    self.lend(component, base, face);
                 }
             }
         }
-        for face in 0..topology.faces(axis) {
-            let cells = topology.face_cells[axis][face];
-            if self.role[axis][face] == Face::Loose
-                && !cells.contains(&NONE)
-                && fractions[cells[downwards]] > MASSLESS
-                && fractions[cells[1 - downwards]] <= EMPTY
-            {
-                let lower = topology.cell_faces[cells[downwards]][axis][downwards];
-                self.role[axis][face] = self.role[axis][lower].lent();
+    }
+
+    /// A face moves as another of its component does, if an unknown moves that.
+    fn lend(&mut self, component: usize, base: usize, face: usize) {
+        if let Some(j) = self.role[component][base].unknown() {
+            self.role[component][face] = Face::Follows(j);
+            if let Some(shares) = &mut self.shares {
+                shares[component][face] = shares[component][base];
             }
         }
     }
@@ -525,6 +532,11 @@ fn lies_on_wall<const D: usize>(
         let other = topology.face_cells[component][face][1 - side];
         topology.cell_neighbours[cell][component][side] == NONE && fractions[other] <= empty
     })
+}
+
+/// Whether so much lies over what has landed in a cell that it falls.
+fn may_fall(fractions: &[f64], lower: usize, upper: usize) -> bool {
+    fractions[upper] > EMPTY.max(HANGING * fractions[lower])
 }
 
 /// Gravity normal to a wall on one side of an axis, positive towards the wall.

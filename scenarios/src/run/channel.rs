@@ -96,6 +96,9 @@ impl Followed<3, SPACE_COMPONENTS> for Falling<'_> {
     }
 }
 
+/// Larger ones were measured in the plane only.
+const LARGEST_COURANT: f64 = 0.45;
+
 pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, Failure> {
     let refused = |error: Error| Failure::Input(format!("{}: {error}", under.scene.origin));
     let Some(case) = case(scene) else {
@@ -104,7 +107,9 @@ pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, 
             under.scene.origin
         )));
     };
-    let collapse = ChannelCollapse::new(&case, &options_of(&scene.solver)).map_err(refused)?;
+    let mut options = options_of(&scene.solver);
+    options.courant = options.courant.min(LARGEST_COURANT);
+    let collapse = ChannelCollapse::new(&case, &options).map_err(refused)?;
     let end = scene.duration_scaled * collapse.units().time();
     let mut falling = Falling { collapse, scene };
     let course = surface_run::follow(&mut falling, end, under)?;
