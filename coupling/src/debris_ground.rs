@@ -19,7 +19,8 @@
 //! Δu_f = J W_f / Σ m_f W_f
 //! ```
 //!
-//! so that its momentum is exact whatever cells hold, and thin ones are not thrown.
+//! so that its momentum is exact whatever cells hold, and thin ones are not thrown. What grains give across the plane, along y, and
+//! their moments have no place in a plane continuum.
 
 mod line;
 
@@ -55,8 +56,6 @@ pub struct SurfaceLedger {
     pub taken: [f64; 2],
     /// Impulse that it has yet to take.
     pub pending: [f64; 2],
-    /// Impulse that found no face with matter.
-    pub lost: [f64; 2],
     /// Sum of the sizes of all impulses.
     pub size: f64,
     /// Largest share of its diameter that a grain sank beyond what it overlapped at an instalment.
@@ -92,7 +91,7 @@ pub struct DebrisGround {
 }
 
 /// Numbers before the lists in a memory.
-const HEAD: usize = 15;
+const HEAD: usize = 13;
 
 /// Faces of a component with matter about a place (m): number, weight, and what they carry in whole cells.
 fn weights<'a>(
@@ -190,6 +189,9 @@ impl DebrisGround {
                 apart[0].hypot(apart[1]) < SPREAD * room.spacing
             });
             let pressing: f64 = beside.map(|(other, _, _)| other.mass).sum();
+            if patch <= 0.0 {
+                continue;
+            }
             let m = grain.mass * patch / (patch + pressing);
             let push = m * frequency * (frequency * depth - 2.0 * damping * apart);
             let push = push.max(0.0);
@@ -246,8 +248,8 @@ impl DebrisGround {
         for (c, impulse) in impulse.into_iter().enumerate() {
             let faces = weights(room, fractions, c, at);
             let whole = cell_mass * faces.map(|(_, weight, load)| weight * load).sum::<f64>();
+            // Where there is no mass nothing was pushed.
             if whole <= 0.0 {
-                self.ledger.lost[c] += impulse;
                 continue;
             }
             self.ledger.pending[c] += impulse;
@@ -283,7 +285,6 @@ impl DebrisGround {
         memory.extend(l.given);
         memory.extend(l.taken);
         memory.extend(l.pending);
-        memory.extend(l.lost);
         memory.extend([l.size, l.deepest]);
         self.line.write(memory);
         memory.push(self.embedded.len() as f64);
@@ -321,9 +322,8 @@ impl DebrisGround {
                 given: [h[4], h[5], h[6]],
                 taken: [h[7], h[8]],
                 pending: [h[9], h[10]],
-                lost: [h[11], h[12]],
-                size: h[13],
-                deepest: h[14],
+                size: h[11],
+                deepest: h[12],
             },
             embedded: embedded
                 .as_chunks::<2>()

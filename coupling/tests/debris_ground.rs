@@ -145,7 +145,7 @@ fn fall(reacts: bool) -> Fall {
     let unit = bed.units().velocity;
     let weigh = |bed: &Collapse| bed.flow().momentum().map(|p| 600.0 * WIDTH * unit * p);
     let mut gained = [0.0; 2];
-    for exchange in 1..=80 {
+    for exchange in 1..=240 {
         for laying in 0..LAYINGS {
             let later = (laying * KEPT) as f64 * STEP;
             let kept = simulation.next_kick() + (KEPT - 1) as f64 * STEP;

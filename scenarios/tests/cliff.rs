@@ -167,7 +167,7 @@ fn what_lies_changes_hands_before_what_stands() {
     let before = area(&profiles[..deposit.len()], 2);
     assert!((area(&deposit, 1) / before - 1.0).abs() < 1e-9);
     let [own, theirs] = [&found, &grains].map(|s| value(s, "x_front"));
-    assert!((own / theirs - 1.0).abs() < 0.3, "{own} {theirs}");
+    assert!((own / theirs - 1.0).abs() < 0.05, "{own} {theirs}");
 }
 
 #[test]

@@ -486,7 +486,9 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             .acceleration
             .iter()
             .fold(0.0_f64, |m, g| m.max(g.abs()));
-        let is_free = self.outside.is_none_or(|outside| outside.cover[cell] == 0.0);
+        let is_free = self
+            .outside
+            .is_none_or(|outside| outside.cover[cell] == 0.0);
         if self.stands && is_free && self.acceleration[axis].abs() <= UPRIGHT * most {
             return (self.faces.pressure[inner], 1.0);
         }

@@ -160,10 +160,17 @@ impl<'a> JoinedCliff<'a> {
         if !calm {
             return None;
         }
-        let debris = self.debris(record, simulation);
+        let debris = match live {
+            None => self.debris(record, simulation),
+            // What is behind the crack is held by now: all that is free came down or stands before it.
+            Some(_) => free_grains(simulation).iter().map(|g| g.id).collect(),
+        };
+        if debris.is_empty() {
+            return None;
+        }
         let parcels = live.map_or_else(Vec::new, |live| live.runout.parcels());
         let base = record.heap.solid_fraction * simulation.domain().lengths().y;
-        if self.lies(simulation, &parcels, (d, base)) {
+        if self.lies(simulation, (d, base)) {
             return Some(Due {
                 grains: debris,
                 last: true,
@@ -183,17 +190,11 @@ impl<'a> JoinedCliff<'a> {
         enough.then_some(Due { grains, last })
     }
 
-    /// Whether the debris lies rather than stands, by its thickness alone: on a steep slope what lies is no pillar.
-    fn lies(
-        &self,
-        simulation: &mut Simulation,
-        parcels: &[[f64; 2]],
-        (d, base): (f64, f64),
-    ) -> bool {
+    /// Whether the debris that is still grains lies rather than stands, by its thickness alone: on a steep slope what lies is
+    /// no pillar. With what has run out as a continuum a pillar beside it would be part of a flat wedge.
+    fn lies(&self, simulation: &mut Simulation, (d, base): (f64, f64)) -> bool {
         let axis = self.scene.heap_axis(d);
-        let mut heights = self.scene.heights(&simulation.grain_list(), &axis, base);
-        let more = axis.heights(parcels.iter().copied(), base);
-        heights.iter_mut().zip(more).for_each(|(h, m)| *h += m);
+        let heights = self.scene.heights(&simulation.grain_list(), &axis, base);
         let pile = Pile::of([&axis.positions(), &heights], 0.0, EDGE * d, |_| 0.0);
         pile.is_none_or(|p| p.wedge_degrees() <= self.scene.runout.steepest_degrees)
     }
@@ -236,15 +237,17 @@ impl<'a> JoinedCliff<'a> {
         due: &Due,
     ) -> Result<Live, Failure> {
         let scene = self.scene;
-        let begun = match &live {
-            Some(live) => live.broken.counts[0],
-            None => simulation.steps_done() as f64,
+        let broken = match &live {
+            Some(live) => live.broken.clone(),
+            None => self.broken(record, simulation, simulation.steps_done() as f64),
         };
-        let broken = self.broken(record, simulation, begun);
         let mut ids: Vec<u32> = simulation.held(|_| true).map(|g| g.id).collect();
         ids.sort_unstable();
         let listed = simulation.grain_list();
-        let all = self.debris(record, simulation);
+        let all = match &live {
+            None => self.debris(record, simulation),
+            Some(_) => free_grains(simulation).iter().map(|g| g.id).collect(),
+        };
         let of = |set: &BTreeSet<u32>| -> Vec<Grain> {
             let rows = ids.iter().zip(&listed).filter(|(id, _)| set.contains(id));
             rows.map(|(_, grain)| *grain).collect()

@@ -3,7 +3,7 @@
 /// How broken the cliff was at the hand-over: what a continuum cannot tell.
 #[derive(Clone, Debug, Default, PartialEq)]
 pub struct Broken {
-    /// Steps made up to the first hand-over, and grains of the face that were still grains.
+    /// Steps made up to the first hand-over, and grains of the face.
     pub counts: [f64; 2],
     /// Share of the contacts before the crack that still held.
     pub held: f64,

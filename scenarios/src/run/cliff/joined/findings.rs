@@ -51,8 +51,12 @@ impl JoinedCliff<'_> {
         self.scene.put_broken(share, broken_at, &record, summary);
         self.scene.put_boulders(broken.bonds, &sizes, summary);
         summary.remarks.push(format!(
-            "Its grains became a continuum {:.0} s after the start; contacts, turn, bonds and boulders are those of then.",
-            runout.instalments.last().map_or(runout.begun, |(time, _)| *time)
+            "Its grains became a continuum {:.0} s after the start{}; contacts, turn, bonds and boulders are those of the first time.",
+            runout.begun,
+            match runout.instalments.last() {
+                Some((last, _)) if *last > runout.begun => format!(", the last of them {last:.0} s after it"),
+                _ => String::new(),
+            }
         ));
         if live.standing.as_ref().is_some_and(|s| s.free > 0) {
             let word = "Some of it stands to the end and stayed grains.";
@@ -143,12 +147,6 @@ impl JoinedCliff<'_> {
                 ledger.residual(),
                 "1",
                 "of the impulses of grains and continuum on each other, over the sum of their sizes",
-            );
-            put(
-                "exchange_lost",
-                ledger.lost[0].hypot(ledger.lost[1]),
-                "N s",
-                "of them, that found no matter",
             );
             put(
                 "deepest_in_continuum",
