@@ -170,7 +170,8 @@ impl<'a> JoinedCliff<'a> {
         }
         let parcels = live.map_or_else(Vec::new, |live| live.runout.parcels());
         let base = record.heap.solid_fraction * simulation.domain().lengths().y;
-        if self.lies(simulation, (d, base)) {
+        // With what has run out as a continuum a pillar beside it would be part of a flat wedge.
+        if live.is_none() && self.lies(simulation, (d, base)) {
             return Some(Due {
                 grains: debris,
                 last: true,
@@ -190,8 +191,7 @@ impl<'a> JoinedCliff<'a> {
         enough.then_some(Due { grains, last })
     }
 
-    /// Whether the debris that is still grains lies rather than stands, by its thickness alone: on a steep slope what lies is
-    /// no pillar. With what has run out as a continuum a pillar beside it would be part of a flat wedge.
+    /// Whether the debris lies rather than stands, by its thickness alone: on a steep slope what lies is no pillar.
     fn lies(&self, simulation: &mut Simulation, (d, base): (f64, f64)) -> bool {
         let axis = self.scene.heap_axis(d);
         let heights = self.scene.heights(&simulation.grain_list(), &axis, base);
