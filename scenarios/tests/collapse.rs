@@ -5,7 +5,7 @@
 mod command;
 
 use colluvium::vtkhdf;
-use command::{colluvium, succeed, summary, table, value};
+use command::{colluvium, steps_say_what_the_summary_says, succeed, summary, table, value};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};
@@ -46,6 +46,7 @@ fn collapse_writes_front_and_deposit() {
     let report = std::fs::read_to_string(folder.path().join("c/report.html")).unwrap();
     assert!(report.contains("Profiles through time"));
     fields_say_what_the_tables_say(&folder.path().join("c"), &deposit);
+    steps_say_what_the_summary_says(&folder.path().join("c"));
 }
 
 /// The fields at rest: their volume, their columns' heights, and pressure under the weight above.
@@ -265,8 +266,14 @@ fn goes_on_to_the_same_state(begun: &str, arguments: impl Fn(&'static str) -> Ve
     let hash = |out: &str| summary(&folder.path().join(out))["state_hash"].clone();
     assert_eq!(hash("whole"), hash("parts"));
     let text = |out: &str| std::fs::read_to_string(folder.path().join(out)).unwrap();
-    for name in ["front.csv", "balance.csv", "profiles.csv"] {
-        // A chute has no front, and what collapses no balance.
+    for name in [
+        "front.csv",
+        "balance.csv",
+        "profiles.csv",
+        "steps.csv",
+        "flowing.csv",
+    ] {
+        // A chute has no front, what collapses no balance, and grains neither steps of a solver nor cells.
         if folder.path().join("whole").join(name).exists() {
             assert_eq!(
                 text(&format!("whole/{name}")),

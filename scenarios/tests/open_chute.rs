@@ -5,7 +5,7 @@
 mod command;
 
 use colluvium::vtkhdf;
-use command::{colluvium, succeed, summary, table, value};
+use command::{colluvium, steps_say_what_the_summary_says, succeed, summary, table, value};
 
 /// Half the cells and a short chute.
 const SMALL: [&str; 4] = ["--set", "scale=0.5", "--set", "grid.length_scaled=2.5"];
@@ -36,6 +36,7 @@ fn fed_layers_pass_through_and_others_do_not_stay() {
     let [distance, _] = run("plug", &["inflow.speed=0.4", "grid.room_scaled=1.8"]);
     assert!(distance > 0.3, "{distance}");
 
+    steps_say_what_the_summary_says(&folder.path().join("plug"));
     let (header, balance) = table(&at("plug", "balance.csv"));
     assert_eq!(header, ["t", "volume", "entered", "left"]);
     let (first, last) = (&balance[0], &balance[balance.len() - 1]);

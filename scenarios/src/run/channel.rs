@@ -132,6 +132,7 @@ pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, 
             .with("x_inside", "m", course.column(4)),
         Table::new("deposit").with("x", "m", x).with("h", "m", h),
         course.profiles("x"),
+        course.steps.all.table(),
     ];
     Ok(Findings {
         summary,

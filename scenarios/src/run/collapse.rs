@@ -293,6 +293,7 @@ fn tables<L: ShearLaw + Clone>(collapse: &Collapse<L>, course: &Course) -> Vec<T
             .with("t", "s", course.column(0))
             .with("flowing_share", "1", course.column(3))
             .with("ill_posed_share", "1", course.column(4)),
+        course.steps.all.table(),
     ]
 }
 

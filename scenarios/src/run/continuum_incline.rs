@@ -3,6 +3,7 @@
 use super::bagnold::failure;
 use super::joined_incline::{self, findings, keys};
 use super::precheck::stand_in_bed;
+use super::step_table::StepTable;
 use super::{Findings, Under, incline};
 use crate::cost::Cost;
 use crate::failure::Failure;
@@ -96,6 +97,7 @@ struct Course {
     samples: u64,
     steps: u64,
     history: Vec<[f64; 3]>,
+    all: StepTable,
 }
 
 impl Course {
@@ -104,6 +106,9 @@ impl Course {
         let velocities = (0..cells).map(|k| column.velocity(k));
         let mean = velocities.sum::<f64>() / cells as f64;
         self.history.push([time, mean, column.velocity(cells - 1)]);
+        for part in column.parts() {
+            self.all.book_layer(part, column.units());
+        }
         if !measures {
             return;
         }
@@ -143,6 +148,7 @@ impl Course {
         put("course/history", self.history.as_flattened().to_vec());
         let counts = vec![self.samples, self.steps];
         record.counts.insert("course/counts".into(), counts);
+        self.all.put_into(&mut record);
         record
     }
 
@@ -159,6 +165,8 @@ impl Course {
             s: record.numbers("flow/s")?.as_chunks::<2>().0.to_vec(),
         };
         column.take_up(state, time)?;
+        let all =
+            StepTable::of(record).ok_or("array `course/step_rows` is not ten numbers a step")?;
         let sums = record.numbers("course/sums")?.to_vec();
         if sums.len() != 3 * column.cells() {
             return Err("array `course/sums` is not three numbers a cell".into());
@@ -173,6 +181,7 @@ impl Course {
             samples,
             steps,
             history,
+            all,
         })
     }
 }
@@ -276,6 +285,7 @@ fn found(
                 .with("t", "s", rows(0))
                 .with("mean_velocity", "m/s", rows(1))
                 .with("surface_velocity", "m/s", rows(2)),
+            course.all.table(),
         ],
         grains: None,
     }

@@ -173,6 +173,7 @@ fn tables(collapse: &CylinderCollapse, course: &Course) -> Vec<Table> {
             .with("r_diagonal", "m", column(3)),
         Table::new("deposit").with("r", "m", r).with("h", "m", h),
         course.profiles("r"),
+        course.steps.all.table(),
     ]
 }
 
@@ -210,6 +211,7 @@ fn tables_over_ground(collapse: &CylinderCollapse, course: &Course) -> Vec<Table
             .with("y", "m", y)
             .with("z_ground", "m", collapse.ground_heights().to_vec())
             .with("h", "m", collapse.heights()),
+        course.steps.all.table(),
     ]
 }
 

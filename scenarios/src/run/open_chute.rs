@@ -201,6 +201,7 @@ fn tables<L: ShearLaw + Clone>(
             .with("left", "m²", course.column(3)),
         course.profiles("x"),
         speeds,
+        course.steps.all.table(),
     ]
 }
 

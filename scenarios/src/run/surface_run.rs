@@ -179,7 +179,10 @@ pub(super) fn follow<const D: usize, const C: usize>(
         // Steps end at the instants of the tables, whenever a run was begun or resumed.
         let next = (flow.time() / end * FRONTS + 1e-6).floor() + 1.0;
         let step = flow.step((next / FRONTS * end).min(end)).map_err(failure)?;
-        course.steps.book(&step, flow.is_at_rest(&step));
+        let (at_rest, volume_error) = (flow.is_at_rest(&step), flow.volume_drift());
+        course
+            .steps
+            .book(&step, at_rest, flow.units(), volume_error);
         if (flow.time() / end * FRONTS - next).abs() < 1e-6 {
             course.see(flow);
             if (next * PROFILES / FRONTS).fract() < 1e-6 {
