@@ -5,7 +5,10 @@
 mod command;
 
 use colluvium::vtkhdf;
-use command::{colluvium, steps_say_what_the_summary_says, succeed, summary, table, value};
+use command::{
+    colluvium, shares_say_what_the_summary_says, steps_say_what_the_summary_says, succeed, summary,
+    table, value,
+};
 
 #[test]
 fn cylinder_writes_front_deposit_and_fields() {
@@ -34,6 +37,7 @@ fn cylinder_writes_front_deposit_and_fields() {
     let found = summary(&folder.path().join("c"));
     assert_eq!(found["status"], "done");
     steps_say_what_the_summary_says(&folder.path().join("c"));
+    shares_say_what_the_summary_says(&folder.path().join("c"));
     let runout = value(&found, "runout_over_aspect");
     assert!((0.93..1.69).contains(&runout), "{runout}");
     // The linear systems are solved to 1e-9, and so symmetric is the flow: 2e-12 on this grid.

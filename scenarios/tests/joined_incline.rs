@@ -99,6 +99,19 @@ fn three_models_tell_of_one_flow() {
         Some(&value(&summary(&at("continuum")), "residual"))
     );
 
+    // All of it flows, and what is ill posed is part of it.
+    let told = summary(&at("continuum"));
+    let [flows, ill_posed] = ["flowing", "ill_posed"].map(|of| {
+        let shares = column(&at("continuum").join("history.csv"), &format!("{of}_share"));
+        let most = shares.into_iter().fold(0.0, f64::max);
+        assert_eq!(most, value(&told, &format!("largest_{of}_share")));
+        most
+    });
+    assert!(
+        flows > 0.99 && (0.0..=flows).contains(&ill_posed),
+        "{flows} {ill_posed}"
+    );
+
     // Grains above the edge were never made.
     assert!(value(&hybrid, "grain_steps_share") < 0.75);
     let steps = |name: &str| summary(&at(name))["cost"]["grain_steps"].as_u64().unwrap();

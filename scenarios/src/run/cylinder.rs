@@ -12,7 +12,7 @@ use crate::table::Table;
 use crate::vtkhdf::Frame;
 use colluvium_continuum::Error;
 use colluvium_continuum::cylinder_collapse::{CylinderCase, CylinderCollapse};
-use colluvium_continuum::free_surface::{SpaceState, SurfaceStep};
+use colluvium_continuum::free_surface::{SpaceState, SurfaceStep, flowing_shares};
 use colluvium_continuum::strain::SPACE_COMPONENTS;
 use colluvium_continuum::units::Units;
 
@@ -127,6 +127,10 @@ impl Followed<3, SPACE_COMPONENTS> for Falling<'_> {
         ]
     }
 
+    fn flowing_shares(&self) -> [f64; 2] {
+        flowing_shares(&self.collapse.flow().cell_fields())
+    }
+
     fn frame(&self) -> Frame {
         frame(&self.collapse)
     }
@@ -173,6 +177,7 @@ fn tables(collapse: &CylinderCollapse, course: &Course) -> Vec<Table> {
             .with("r_diagonal", "m", column(3)),
         Table::new("deposit").with("r", "m", r).with("h", "m", h),
         course.profiles("r"),
+        course.flowing(),
         course.steps.all.table(),
     ]
 }
@@ -211,6 +216,7 @@ fn tables_over_ground(collapse: &CylinderCollapse, course: &Course) -> Vec<Table
             .with("y", "m", y)
             .with("z_ground", "m", collapse.ground_heights().to_vec())
             .with("h", "m", collapse.heights()),
+        course.flowing(),
         course.steps.all.table(),
     ]
 }
@@ -288,6 +294,7 @@ fn describe(summary: &mut Summary, falling: &Falling, course: &Course, wall_s: f
         "1",
         "bytes: peak memory of the process over cells with a pressure",
     );
+    surface_run::describe_shares(summary, course);
     surface_run::describe_rest(summary, collapse.time(), course);
     surface_run::describe_steps(summary, falling, course, scene.solver.strain_rate_floor);
     let (r, _) = collapse.profile();

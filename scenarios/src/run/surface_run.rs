@@ -36,6 +36,8 @@ pub(super) trait Followed<const D: usize, const C: usize> {
     fn profile(&self) -> (Vec<f64>, Vec<f64>);
     /// What is noted at every instant, the time first.
     fn row(&self) -> Vec<f64>;
+    /// Shares of the material's volume: that flows, and that flows where the equations are ill posed.
+    fn flowing_shares(&self) -> [f64; 2];
     /// The fields of now.
     fn frame(&self) -> Frame;
     /// Heights of the ground, if there is any: a run goes on over the same only.
@@ -51,6 +53,8 @@ pub(super) struct Course {
     rows: Vec<f64>,
     /// Numbers of a row.
     width: usize,
+    /// Which share of the volume flows and flows where the equations are ill posed, at every instant of the rows.
+    shares: Vec<[f64; 2]>,
     /// Time, place and height, row by row.
     profiles: [Vec<f64>; 3],
     /// Heights of the ground; none on a level floor.
@@ -74,6 +78,7 @@ impl Course {
         let row = flow.row();
         if self.last().is_none_or(|last| last[0] < row[0]) {
             self.rows.extend(row);
+            self.shares.push(flow.flowing_shares());
         }
     }
 
@@ -101,6 +106,15 @@ impl Course {
         self.column(number).into_iter().fold(0.0, f64::max)
     }
 
+    /// The table of shares that flow, and flow where the equations are ill posed.
+    pub fn flowing(&self) -> Table {
+        let share = |number: usize| self.shares.iter().map(|s| s[number]).collect();
+        Table::new("flowing")
+            .with("t", "s", self.column(0))
+            .with("flowing_share", "1", share(0))
+            .with("ill_posed_share", "1", share(1))
+    }
+
     /// The table of profiles over the places of this name.
     pub fn profiles(&self, place: &str) -> Table {
         let [times, places, heights] = self.profiles.clone();
@@ -114,6 +128,7 @@ impl Course {
         let mut record = Record::default();
         for (name, values) in [
             ("course/rows", self.rows.clone()),
+            ("course/shares", self.shares.as_flattened().to_vec()),
             ("course/profiles", self.profiles.concat()),
             ("ground", self.ground.clone()),
         ] {
@@ -135,12 +150,13 @@ impl Course {
         let rows = numbers("course/rows")?.clone();
         let course = Course {
             width: self.width,
+            shares: numbers("course/shares")?.as_chunks().0.to_vec(),
             profiles: columns(numbers("course/profiles")?),
             ground: numbers("ground").cloned().unwrap_or_default(),
             steps: Steps::of(record)?,
             rows,
         };
-        let fits = course.rows.len().is_multiple_of(self.width.max(1));
+        let fits = course.rows.len() == course.shares.len() * self.width;
         fits.then_some(())?;
         Some((course, state_of(record)?))
     }
@@ -262,6 +278,22 @@ pub(super) fn describe_steps<const D: usize, const C: usize>(
         summary,
         course.steps.last.max_speed * units.velocity,
         strain_rate_floor / units.time(),
+    );
+}
+
+/// Says which shares of the material flowed, and flowed where the equations are ill posed.
+pub(super) fn describe_shares(summary: &mut Summary, course: &Course) {
+    let largest = |number: usize| {
+        let all = course.shares.iter().map(|s| s[number]);
+        Quantity::new(all.fold(0.0, f64::max), "1")
+    };
+    summary.put(
+        "largest_flowing_share",
+        largest(0).from("of the volume, at any instant of flowing.csv"),
+    );
+    summary.put(
+        "largest_ill_posed_share",
+        largest(1).from("of the volume: flows where short waves grow without bound, C(I) > 0"),
     );
 }
 

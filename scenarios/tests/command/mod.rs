@@ -92,6 +92,19 @@ pub fn steps_say_what_the_summary_says(run: &Path) {
     );
 }
 
+/// What flows where the equations are ill posed is part of what flows, and the summary tells the largest shares.
+pub fn shares_say_what_the_summary_says(run: &Path) {
+    let (header, rows) = table(&run.join("flowing.csv"));
+    assert_eq!(header, ["t", "flowing_share", "ill_posed_share"]);
+    assert!(rows.iter().all(|row| (0.0..=1.0).contains(&row[1])));
+    assert!(rows.iter().all(|row| (0.0..=row[1]).contains(&row[2])));
+    let most = |at: usize| rows.iter().map(|row| row[at]).fold(0.0, f64::max);
+    let found = summary(run);
+    assert_eq!(most(1), value(&found, "largest_flowing_share"));
+    assert_eq!(most(2), value(&found, "largest_ill_posed_share"));
+    assert!(most(1) > 0.3, "{}", most(1));
+}
+
 /// Runs `colluvium` in a folder.
 pub fn colluvium(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_colluvium"))
