@@ -326,11 +326,44 @@ fn columns_of_any_law() {
             "rheology.table=[[0.01,0.4],[1.0,0.4]]",
         ],
     );
+    laws_with_a_yield_stress_rest_and_others_creep(folder.path());
     assert!(
         regularised < mu_i && regularised > 0.7 * mu_i,
         "{mu_i} {regularised}"
     );
     assert!((flat / coulomb - 1.0).abs() < 1e-3, "{flat} {coulomb}");
+}
+
+/// μ(I) comes to rest and says below which speeds; the regularised law still creeps, by what summary and report tell, and
+/// rises nowhere.
+fn laws_with_a_yield_stress_rest_and_others_creep(folder: &Path) {
+    let [rests, creeps] = ["mu-i", "barker-gray"].map(|out| summary(&folder.join(out)));
+    let report = |out: &str| std::fs::read_to_string(folder.join(out).join("report.html")).unwrap();
+    assert!(value(&rests, "largest_speed") < value(&rests, "rest_speed"));
+    assert!(rests["results"].get("creep_speed").is_none());
+    assert!(report("mu-i").contains("At rest: speeds below") && !report("mu-i").contains("creeps"));
+    assert!(creeps["results"]["time_of_rest"]["value"].is_null());
+    assert!(creeps["results"].get("rest_speed").is_none());
+    let (speed, fall) = (
+        value(&creeps, "creep_speed"),
+        value(&creeps, "top_fall_rate"),
+    );
+    assert_eq!(speed, value(&creeps, "largest_speed"));
+    assert!(
+        speed > 10.0 * value(&rests, "rest_speed") && (0.0..speed).contains(&fall),
+        "{speed} {fall}"
+    );
+    let (_, fronts) = table(&folder.join("barker-gray/front.csv"));
+    let [first, last] = [&fronts[fronts.len() - 11], &fronts[fronts.len() - 1]];
+    let told = (first[2] - last[2]) / (last[0] - first[0]);
+    assert!((fall - told).abs() < 1e-9 * speed, "{fall} {told}");
+    // The bundled column is 1 m high.
+    let scaled = value(&creeps, "creep_speed_scaled");
+    assert!(
+        (scaled * 9.81_f64.sqrt() / speed - 1.0).abs() < 1e-9,
+        "{scaled}"
+    );
+    assert!(report("barker-gray").contains("no yield stress"));
 }
 
 /// Side walls hold the material back.

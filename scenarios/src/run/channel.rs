@@ -3,7 +3,7 @@
 use super::collapse::{self, options_of};
 use super::collapse_ground::contact;
 use super::surface_fields::space_frame;
-use super::surface_run::{self, Course, Followed};
+use super::surface_run::{self, Course, Deposit, Followed, yields};
 use super::{Findings, Under};
 use crate::failure::Failure;
 use crate::scene::CollapseScene;
@@ -192,7 +192,12 @@ fn describe(summary: &mut Summary, falling: &Falling, course: &Course) {
         summary.put(name, Quantity::new(value, unit).from(source));
     }
     surface_run::describe_shares(summary, course);
-    surface_run::describe_rest(summary, collapse.time(), course);
+    let deposit = Deposit {
+        height: 2,
+        rest_speed: collapse.rest_speed(),
+        yields: yields(collapse.rheology()),
+    };
+    surface_run::describe_rest(summary, falling, course, &deposit);
     surface_run::describe_steps(summary, falling, course, scene.solver.strain_rate_floor);
     let (x, _) = collapse.profile();
     if last[1] >= x.last().copied().unwrap_or(0.0) {

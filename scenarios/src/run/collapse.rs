@@ -3,7 +3,7 @@
 mod beside_continuum;
 
 use super::surface_fields::{SurfaceFields, field};
-use super::surface_run::{self, Course, Followed};
+use super::surface_run::{self, Course, Deposit, Followed, yields};
 use super::{Findings, Under, channel, collapse_ground, joined_column, world};
 use crate::failure::Failure;
 use crate::scene::{
@@ -322,7 +322,12 @@ fn describe<L: ShearLaw + Clone>(summary: &mut Summary, falling: &Falling<L>, co
     );
     put("deposit_height", height, "m", "greatest height at the end");
     surface_run::describe_shares(summary, course);
-    surface_run::describe_rest(summary, collapse.time(), course);
+    let deposit = Deposit {
+        height: 2,
+        rest_speed: collapse.rest_speed(),
+        yields: yields(collapse.rheology()),
+    };
+    surface_run::describe_rest(summary, falling, course, &deposit);
     surface_run::describe_steps(summary, falling, course, scene.solver.strain_rate_floor);
     let (x, _) = collapse.profile();
     if front >= x.last().copied().unwrap_or(0.0) {

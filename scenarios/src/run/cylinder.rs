@@ -3,7 +3,7 @@
 use super::collapse::options_of;
 use super::collapse_ground::contact;
 use super::surface_fields::space_frame;
-use super::surface_run::{self, Course, Followed};
+use super::surface_run::{self, Course, Deposit, Followed, yields};
 use super::{Findings, Under, cylinder_ground};
 use crate::failure::Failure;
 use crate::scene::{CylinderScene, Scene};
@@ -295,7 +295,12 @@ fn describe(summary: &mut Summary, falling: &Falling, course: &Course, wall_s: f
         "bytes: peak memory of the process over cells with a pressure",
     );
     surface_run::describe_shares(summary, course);
-    surface_run::describe_rest(summary, collapse.time(), course);
+    let deposit = Deposit {
+        height: 4,
+        rest_speed: collapse.rest_speed(),
+        yields: yields(collapse.rheology()),
+    };
+    surface_run::describe_rest(summary, falling, course, &deposit);
     surface_run::describe_steps(summary, falling, course, scene.solver.strain_rate_floor);
     let (r, _) = collapse.profile();
     let farthest = match scene.terrain {

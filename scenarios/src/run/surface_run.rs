@@ -13,6 +13,7 @@ use crate::table::Table;
 use crate::vtkhdf::Frame;
 use colluvium_continuum::Error;
 use colluvium_continuum::free_surface::{SurfaceState, SurfaceStep};
+use colluvium_continuum::rheology::ShearLaw;
 use colluvium_continuum::units::Units;
 use colluvium_dem::Record;
 
@@ -99,6 +100,14 @@ impl Course {
     pub fn column(&self, number: usize) -> Vec<f64> {
         let rows = self.rows.chunks_exact(self.width.max(1));
         rows.map(|row| row[number]).collect()
+    }
+
+    /// How fast a height falls (m/s) over the last instants.
+    fn fall(&self, number: usize) -> f64 {
+        let last = self.shares.len().saturating_sub(1);
+        let first = last.saturating_sub(FALL);
+        let [times, heights] = [self.column(0), self.column(number)];
+        (heights[first] - heights[last]) / (times[last] - times[first])
     }
 
     /// The largest number of a column, at least 0.
@@ -297,11 +306,73 @@ pub(super) fn describe_shares(summary: &mut Summary, course: &Course) {
     );
 }
 
-/// Says when a run came to rest.
-pub(super) fn describe_rest(summary: &mut Summary, time: f64, course: &Course) {
-    let time = if course.steps.rest() { time } else { f64::NAN };
+/// What a deposit's rest or creep is told from.
+pub(super) struct Deposit {
+    /// Which number of a row is its greatest height (m).
+    pub height: usize,
+    /// Speed (m/s) below which everything is at rest.
+    pub rest_speed: f64,
+    /// Whether the material bears shear at rest: without a yield stress every slope creeps.
+    pub yields: bool,
+}
+
+/// Whether a law has a yield stress.
+pub(super) fn yields(law: &impl ShearLaw) -> bool {
+    law.friction_limits()[0] > 0.0 || law.cohesion() > 0.0
+}
+
+/// Instants over which the fall of a top is taken.
+const FALL: usize = 10;
+
+/// Says when a run came to rest and what rest is, or how fast the deposit of a law without yield stress creeps.
+pub(super) fn describe_rest<const D: usize, const C: usize>(
+    summary: &mut Summary,
+    flow: &impl Followed<D, C>,
+    course: &Course,
+    deposit: &Deposit,
+) {
+    let rests = course.steps.rest();
+    let time = if rests { flow.time() } else { f64::NAN };
     summary.put(
         "time_of_rest",
         Quantity::new(time, "s").from("speeds below 5 ε height; null where the run ended before"),
     );
+    let unit = flow.units().velocity;
+    if rests {
+        summary.put(
+            "rest_speed",
+            Quantity::new(deposit.rest_speed, "m/s").from("at rest all speeds are below it"),
+        );
+        summary.remarks.push(format!(
+            "At rest: speeds below {:.2e} m/s, {:.1e} √(gravity height).",
+            deposit.rest_speed,
+            deposit.rest_speed / unit
+        ));
+    }
+    if deposit.yields {
+        return;
+    }
+    let speed = course.steps.last.max_speed * unit;
+    let fall = course.fall(deposit.height);
+    for (name, value, what) in [
+        ("creep_speed", speed, "largest speed at the end"),
+        (
+            "top_fall_rate",
+            fall,
+            "of the greatest height, over the last ten instants of front.csv",
+        ),
+    ] {
+        summary.put(name, Quantity::new(value, "m/s").from(what));
+        summary.put(
+            &format!("{name}_scaled"),
+            Quantity::new(value / unit, "1").from("over √(gravity height)"),
+        );
+    }
+    summary.remarks.push(format!(
+        "This law has no yield stress, so every slope of the deposit creeps for ever: at the end of the run its fastest \
+         material moves with {speed:.2e} m/s, {:.1e} √(gravity height), and its top falls with {fall:.2e} m/s, {:.1e} \
+         √(gravity height).",
+        speed / unit,
+        fall / unit
+    ));
 }
