@@ -350,13 +350,15 @@ fn laws_with_a_yield_stress_rest_and_others_creep(folder: &Path) {
     );
     assert_eq!(speed, value(&creeps, "largest_speed"));
     assert!(
-        speed > 10.0 * value(&rests, "rest_speed") && (0.0..speed).contains(&fall),
+        speed > 0.0 && fall.abs() < 1e-3 * 9.81_f64.sqrt(),
         "{speed} {fall}"
     );
     let (_, fronts) = table(&folder.join("barker-gray/front.csv"));
+    // It is followed to the end, where the other one has long ended.
+    assert_eq!(fronts.len(), 241);
     let [first, last] = [&fronts[fronts.len() - 11], &fronts[fronts.len() - 1]];
     let told = (first[2] - last[2]) / (last[0] - first[0]);
-    assert!((fall - told).abs() < 1e-9 * speed, "{fall} {told}");
+    assert!((fall - told).abs() < 1e-12, "{fall} {told}");
     // The bundled column is 1 m high.
     let scaled = value(&creeps, "creep_speed_scaled");
     assert!(

@@ -66,7 +66,7 @@ impl Followed<3, SPACE_COMPONENTS> for Falling<'_> {
     }
 
     fn is_at_rest(&self, step: &SurfaceStep) -> bool {
-        self.collapse.is_at_rest(step)
+        yields(self.collapse.rheology()) && self.collapse.is_at_rest(step)
     }
 
     fn volume_drift(&self) -> f64 {

@@ -162,7 +162,8 @@ impl<L: ShearLaw + Clone> Followed<2, 2> for Falling<'_, L> {
     }
 
     fn is_at_rest(&self, step: &SurfaceStep) -> bool {
-        self.collapse.is_at_rest(step)
+        // Without a yield stress what is slow still creeps, and how fast is to be seen.
+        yields(self.collapse.rheology()) && self.collapse.is_at_rest(step)
     }
 
     fn volume_drift(&self) -> f64 {
