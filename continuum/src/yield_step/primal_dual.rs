@@ -117,6 +117,9 @@ const LOOSEST: f64 = 50.0;
 /// A linear solution that leaves more than this is hardly one.
 const WEAKEST: f64 = 0.3;
 
+/// Cells may go to and fro as long as what is left falls below this part of what it was.
+const PROGRESS: f64 = 0.5;
+
 /// Most parts that are solved between two iterations of the whole: what is left of one lies beside it.
 const MOST_PARTS: usize = 4;
 
@@ -262,6 +265,8 @@ impl<const C: usize> PrimalDual<C> {
         }
         // Points whose law was missed when a part could not be solved: there is hope again when they are fewer.
         let mut in_vain = usize::MAX;
+        // What was left over what is allowed when the count of changes to and fro began.
+        let mut left_when_counting = f64::INFINITY;
         for iteration in 0..strategy.max_iterations {
             self.release(problem.discretisation, iteration == 0);
             self.linearise(problem, floor);
@@ -320,8 +325,18 @@ impl<const C: usize> PrimalDual<C> {
                 report.converged = true;
                 return;
             }
-            if self.conflicts.is_cycling() {
-                return;
+            let left = report.residuals.over(&allowed);
+            if !is_last_floor || iteration == 0 {
+                // What changes on the way down is no conflict yet,
+                left_when_counting = left;
+                self.conflicts.begin();
+            } else if self.conflicts.is_cycling() {
+                // nor is what changes while the rest converges.
+                if left > PROGRESS * left_when_counting {
+                    return;
+                }
+                left_when_counting = left;
+                self.conflicts.begin();
             }
             if fraction >= 0.5 {
                 floor = (floor * strategy.factor).max(self.options.strain_rate_floor);
