@@ -1,10 +1,6 @@
 //! Rigid bodies in scenes of one's own: a lander on a bed, a pendulum, a paddle, what is refused.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use command::{colluvium, hash, succeed, summary, table, value};
+use crate::command::{colluvium, hash, succeed, summary, table, value};
 use std::path::Path;
 use std::process::{Command, Stdio};
 

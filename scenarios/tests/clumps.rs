@@ -1,10 +1,6 @@
 //! Clumps of grains in scenes of one's own: a heap of them, restarts, what is refused.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use command::{colluvium, hash, succeed, summary, table, value};
+use crate::command::{colluvium, hash, succeed, summary, table, value};
 use std::process::{Command, Stdio};
 
 /// Jacks of four balls that fall on a floor within a tube, on a few grains.

@@ -1,10 +1,6 @@
 //! Places that cannot be written: a clear message, and the last good state is left.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use command::{colluvium, hash, succeed, summary};
+use crate::command::{colluvium, hash, succeed, summary};
 use std::path::Path;
 use std::process::{Command, Output};
 

@@ -1,10 +1,6 @@
 //! A ball that falls into grains with a continuum around them, from the command line.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use command::{colluvium, hash, succeed, summary, table, value};
+use crate::command::{colluvium, hash, succeed, summary, table, value};
 use std::path::Path;
 use std::process::{Command, Stdio};
 

@@ -1,10 +1,6 @@
 //! Runs that are killed or stopped at any moment go on to the same state.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use command::{
+use crate::command::{
     INSTALMENTS, MOVING_EDGE, SMALL_COMET_CLIFF, SMALL_HYBRID, SMALL_JOINED_COLUMN, colluvium,
     hash, succeed, table,
 };

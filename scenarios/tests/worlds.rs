@@ -1,10 +1,6 @@
 //! The ball, the silos and the slope: what is exact in them, and what must fail.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use command::{colluvium, hash, succeed, summary, table, value};
+use crate::command::{colluvium, hash, succeed, summary, table, value};
 use std::path::Path;
 use std::process::{Command, Stdio};
 

@@ -1,7 +1,5 @@
 //! Running the binary and reading what it wrote.
 
-#![allow(dead_code)] // each test file uses its own part
-
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};
