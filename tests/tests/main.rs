@@ -2,6 +2,7 @@
 
 #![allow(clippy::unwrap_used)] // a test may panic
 
+mod binaries;
 mod bulk_column;
 mod bulk_gas;
 mod bulk_hopper;
