@@ -2,7 +2,7 @@
 
 use crate::command::{
     INSTALMENTS, MOVING_EDGE, SMALL_COMET_CLIFF, SMALL_HYBRID, SMALL_JOINED_COLUMN, colluvium,
-    hash, succeed, table,
+    hash, pause, succeed, table,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -32,6 +32,7 @@ fn kill(folder: &Path, arguments: &[&str], mut now: impl FnMut() -> bool) -> boo
             assert!(status.success(), "{arguments:?} failed by itself");
             return false;
         }
+        pause();
     }
     child.kill().unwrap();
     child.wait().unwrap().code().is_none()
