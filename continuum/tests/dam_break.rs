@@ -5,8 +5,6 @@
 //! well, which that solution neglects, so they meet slowly: on 16 cells |h − h_Ritter| falls from 0.095 at
 //! t = 1 √(H/g) (32 cells) to 0.046 at 2 and 0.037 at 2.5, and the depth at the dam from 0.61 to 0.48 (4/9).
 // A helper of a test may panic like the test itself.
-#![allow(clippy::unwrap_used)]
-
 use colluvium_continuum::free_surface::{SurfaceFlow, SurfaceOptions};
 use colluvium_continuum::grid::{Axis, Boundary, Grid};
 use colluvium_continuum::rheology::MuI;

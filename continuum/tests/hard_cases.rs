@@ -1,8 +1,6 @@
 //! What makes solvers of yield-stress flow fail: contrasts of viscosity, pressure that vanishes, time
 //! steps of any size.
 // A helper of a test may panic like the test itself.
-#![allow(clippy::unwrap_used)]
-
 use std::ops::ControlFlow;
 
 use colluvium_continuum::bagnold::BagnoldCase;

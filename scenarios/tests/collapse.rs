@@ -1,11 +1,7 @@
 //! The collapse of a column from the command line.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
+use crate::command::{colluvium, succeed, summary, table, value};
 use colluvium::vtkhdf;
-use command::{colluvium, succeed, summary, table, value};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};

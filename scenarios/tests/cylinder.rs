@@ -1,11 +1,7 @@
 //! The collapse of a cylinder in space, from the command line.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
+use crate::command::{colluvium, succeed, summary, table, value};
 use colluvium::vtkhdf;
-use command::{colluvium, succeed, summary, table, value};
 
 #[test]
 fn cylinder_writes_front_deposit_and_fields() {

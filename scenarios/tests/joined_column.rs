@@ -1,10 +1,8 @@
 //! A column that is grains in front and a continuum behind, from the command line.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use command::{MOVING_EDGE, SMALL_JOINED_COLUMN, colluvium, hash, succeed, summary, table, value};
+use crate::command::{
+    MOVING_EDGE, SMALL_JOINED_COLUMN, colluvium, hash, succeed, summary, table, value,
+};
 use std::path::Path;
 
 fn arguments<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {

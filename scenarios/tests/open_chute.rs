@@ -1,11 +1,7 @@
 //! A chute that is fed and open, from the command line.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
+use crate::command::{colluvium, succeed, summary, table, value};
 use colluvium::vtkhdf;
-use command::{colluvium, succeed, summary, table, value};
 
 /// Half the cells and a short chute.
 const SMALL: [&str; 4] = ["--set", "scale=0.5", "--set", "grid.length_scaled=2.5"];

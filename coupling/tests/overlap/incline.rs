@@ -1,8 +1,8 @@
 //! Flow down an incline, grains on one side of the edge and continuum on the other, against grains alone over
 //! the same window. Every joined run starts from the full run's own state.
 
-use crate::comparison::{Errors, continuum_error, mean, profile};
-use crate::world::{Bed, deep_bed, small_bed};
+use super::comparison::{Errors, continuum_error, mean, profile};
+use super::world::{Bed, deep_bed, small_bed};
 use colluvium_continuum::rheology::MuI;
 use colluvium_coupling::coarse_graining::Profile;
 use colluvium_coupling::overlap::force_blending::ForceBlending;

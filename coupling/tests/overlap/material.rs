@@ -1,6 +1,6 @@
 //! A column that is continuum behind an edge that moves with the material, and grains in front of it.
 
-use crate::world::{DENSITY, STEP, STIFFNESS, law};
+use super::world::{DENSITY, STEP, STIFFNESS, law};
 use colluvium_continuum::column_collapse::CollapseCase;
 use colluvium_continuum::free_surface::SurfaceOptions;
 use colluvium_continuum::rheology::MuI;

@@ -1,7 +1,7 @@
 //! Motions that must not be disturbed: uniform translation, and shear between plates.
 
-use crate::comparison::profile;
-use crate::world::{Bed, DENSITY, deep_bed, law, rheology, scales, small_bed, steps};
+use super::comparison::profile;
+use super::world::{Bed, DENSITY, deep_bed, law, rheology, scales, small_bed, steps};
 use colluvium_continuum::grid::Boundary;
 use colluvium_continuum::rheology::MuI;
 use colluvium_coupling::coarse_graining::ProfileRow;

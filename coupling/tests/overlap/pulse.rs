@@ -1,6 +1,6 @@
 //! A compression pulse in a bed at rest: what comes back from the edge, by its impedance.
 
-use crate::world::{Bed, STEP, deep_bed, rheology, scales, small_bed};
+use super::world::{Bed, STEP, deep_bed, rheology, scales, small_bed};
 use colluvium_coupling::overlap::{NormalMotion, Overlap, OverlapSettings};
 use colluvium_dem::{Simulation, Snapshot};
 use nalgebra::Vector3;

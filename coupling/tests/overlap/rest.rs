@@ -1,6 +1,6 @@
 //! A column at rest stays at rest, and keeps its density in the overlap.
 
-use crate::world::{Bed, deep_bed, fastest, small_bed, steps};
+use super::world::{Bed, deep_bed, fastest, small_bed, steps};
 use colluvium_coupling::overlap::{Averages, NormalMotion, Overlap, OverlapSettings};
 use colluvium_dem::{Simulation, Snapshot};
 

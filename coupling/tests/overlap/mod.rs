@@ -2,8 +2,6 @@
 //!
 //! Units: mean diameter, mean mass and gravity are 1; times are √(d/g).
 
-#![allow(clippy::unwrap_used)]
-
 mod books;
 mod comparison;
 mod growth;
