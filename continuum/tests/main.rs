@@ -4,6 +4,7 @@
 
 mod bagnold;
 mod column_collapse;
+mod creep;
 mod cylinders_on_ground;
 mod dam_break;
 mod free_surface;
