@@ -3,8 +3,8 @@
 # collapses and dam breaks on several grids, optimised.
 # Prints what they measure; how long all of it takes on a quiet machine was not measured (the run-out of columns alone: 18
 # minutes on a busy one). A name as argument runs only the tests that hold it; the file of a test is part of
-# its name (`cliffs::`).
+# its name (`cliffs::`). A test that fails does not keep the others from running; the exit status tells that there was one.
 set -eu
 cd "$(dirname "$0")/.."
 .ci/system-packages
-cargo test --release -p colluvium-tests -p colluvium-continuum -p colluvium-coupling "$@" -- --ignored --nocapture
+cargo test --release --no-fail-fast -p colluvium-tests -p colluvium-continuum -p colluvium-coupling "$@" -- --ignored --nocapture

@@ -15,7 +15,7 @@
 
 use crate::discretisation::ThresholdPressure;
 use crate::error::{Error, require};
-use crate::flow::{Flow, YieldMethod};
+use crate::flow::{Flow, StepRecord, YieldMethod};
 use crate::grid::{Axis, Boundary, Grid};
 use crate::rheology::{Rheology, ShearLaw};
 use crate::units::Units;
@@ -52,6 +52,8 @@ pub struct Column<L> {
     along: std::ops::Range<usize>,
     /// Momentum residual of the last step, as a fraction of g.
     residual: f64,
+    /// The parts of the last step, natural units.
+    parts: Vec<StepRecord>,
 }
 
 /// Steps into which one may fall apart before it is given up.
@@ -112,6 +114,7 @@ impl<L: ShearLaw> ColumnCase<L> {
             shares: vec![0.0; self.cells + 1],
             along: discretisation.grid().component(0),
             residual: 0.0,
+            parts: Vec::new(),
             flow,
         })
     }
@@ -222,6 +225,21 @@ impl<L: Rheology> Column<L> {
         self.residual
     }
 
+    /// The parts into which the last step fell, in natural units: one where none had to be cut.
+    pub fn parts(&self) -> &[StepRecord] {
+        &self.parts
+    }
+
+    /// Natural units.
+    pub fn units(&self) -> &Units {
+        &self.units
+    }
+
+    /// Shares of the material that has yielded, and that has yielded where the equations are ill posed.
+    pub fn yielded_and_ill_posed(&self) -> [f64; 2] {
+        self.flow.yielded_and_ill_posed()
+    }
+
     /// Advances by `dt` (s) with given stresses on the faces (Pa, counted by their shares), impulses per area
     /// into the cells (Pa s) and pressures on the ends (Pa; without effect on a rigid one).
     ///
@@ -253,8 +271,10 @@ impl<L: Rheology> Column<L> {
             }
         }
         let mut left = dt;
+        self.parts.clear();
         for _ in 0..MOST_PARTS {
             let record = self.flow.step(left)?;
+            self.parts.push(record);
             self.residual = record.residuals.momentum;
             left -= record.dt;
             if left <= 1e-12 * dt {

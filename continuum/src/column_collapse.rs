@@ -399,6 +399,11 @@ impl<L: ShearLaw + Clone> Collapse<L> {
         step.max_speed < self.rest_speed
     }
 
+    /// Speed (m/s) below which everything is at rest.
+    pub fn rest_speed(&self) -> f64 {
+        self.rest_speed * self.units.velocity
+    }
+
     /// Volume gained since the start, relative.
     pub fn volume_drift(&self) -> f64 {
         self.flow.volume() / self.start_volume - 1.0
@@ -426,20 +431,6 @@ impl<L: ShearLaw + Clone> Collapse<L> {
             }
         }
         fields
-    }
-
-    /// Shares of the material's volume: that flows, and that flows where the equations of motion are ill posed.
-    pub fn flowing_shares(&self) -> [f64; 2] {
-        let fields = self.flow.cell_fields();
-        let share = |counts: &dyn Fn(&CellFields) -> bool| {
-            let (mut part, mut whole) = (0.0, 0.0);
-            for f in &fields {
-                whole += f.fraction;
-                part += if counts(f) { f.fraction } else { 0.0 };
-            }
-            if whole > 0.0 { part / whole } else { 0.0 }
-        };
-        [share(&|f| f.flows), share(&|f| !f.well_posed)]
     }
 
     /// Where the heap reaches down to a height (m).

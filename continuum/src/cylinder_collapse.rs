@@ -301,6 +301,11 @@ impl CylinderCollapse {
         step.max_speed < self.rest_speed
     }
 
+    /// Speed (m/s) below which everything is at rest.
+    pub fn rest_speed(&self) -> f64 {
+        self.rest_speed * self.units.velocity
+    }
+
     /// Volume gained since the start, relative.
     pub fn volume_drift(&self) -> f64 {
         self.flow.volume() / self.start_volume - 1.0

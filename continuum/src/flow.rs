@@ -133,6 +133,8 @@ pub struct StepRecord {
     pub newton_iterations: usize,
     /// Linear systems solved, those of failed attempts included.
     pub linear_solves: usize,
+    /// Times that the step was cut and tried again.
+    pub cuts: usize,
     /// Residuals of the equations, in natural units.
     pub residuals: Residuals,
     /// Mass-weighted mean velocity along x.
@@ -260,6 +262,7 @@ impl<R: Rheology> Flow<R> {
                     dt,
                     newton_iterations: work.iterations,
                     linear_solves: work.linear_solves,
+                    cuts: cut as usize,
                     residuals: work.residuals,
                     mean_velocity: self.mean_velocity(),
                     acceleration: self.largest_change() / dt,

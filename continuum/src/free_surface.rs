@@ -24,7 +24,7 @@ mod topology;
 mod transport;
 
 pub use faces::ThinLayer;
-pub use fields::CellFields;
+pub use fields::{CellFields, flowing_shares};
 pub use flow::{
     History, SpaceFields, SpaceFlow, SpaceState, Spent, SurfaceFlow, SurfaceOptions, SurfaceState,
     SurfaceStep,

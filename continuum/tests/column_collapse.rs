@@ -289,16 +289,23 @@ fn low_heap_has_no_steps() {
 
 /// Profiles at t = 6 on three grids come closer by order 1.7 and 1.4 at a = 0.5 and 1.42. At a = 6.26, where
 /// the heap is a few cells thick, the order is 1.2 at t = 3; from then on the tip of the toe, thinner than a grain and than a
-/// cell, still creeps farther on finer grids, and at rest profiles differ by 0.92 and 0.79 % of the area: no order
-/// is asked of them there, but of the centre of mass (3.5). Basilisk at a = 1.42: 4.6e-2 between 128 and 256 cells, 4.9e-2 between 256 and 512.
+/// cell, still creeps farther on finer grids, and at rest profiles differ by 0.92 and 0.81 % of the area (0.79 while steps were of first
+/// order in time, whose errors cancelled some of those of the grid): a known lack, no order of one is asked of them there, but of the centre of mass (3.5). Basilisk at a = 1.42: 4.6e-2 between 128 and 256 cells, 4.9e-2 between 256 and 512.
 #[test]
 #[ignore = "long: run by tests/validate.sh"]
 fn deposits_converge_with_the_grid() {
-    for (aspect, diameter, grids, end, least) in [
-        (0.5, 1.0 / 30.0, [32, 64, 128], 6.0, 1.3),
-        (1.42, 1.0 / 65.0, [64, 128, 256], 6.0, 1.1),
-        (6.26, 1.0 / 134.0, [96, 192, 384], 3.0, 1.0),
-        (6.26, 1.0 / 134.0, [96, 192, 384], 6.0, f64::NEG_INFINITY),
+    for (aspect, diameter, grids, end, least, most) in [
+        (0.5, 1.0 / 30.0, [32, 64, 128], 6.0, 1.3, 0.008),
+        (1.42, 1.0 / 65.0, [64, 128, 256], 6.0, 1.1, 0.008),
+        (6.26, 1.0 / 134.0, [96, 192, 384], 3.0, 1.0, 0.008),
+        (
+            6.26,
+            1.0 / 134.0,
+            [96, 192, 384],
+            6.0,
+            f64::NEG_INFINITY,
+            0.0085,
+        ),
     ] {
         let cases = grids.map(|cells| case(aspect, cells, diameter));
         let runs = cases.map(|case| run(&case, &SurfaceOptions::default(), end).0);
@@ -315,7 +322,7 @@ fn deposits_converge_with_the_grid() {
         println!(
             "a = {aspect}, t = {end}, {grids:?} cells: profiles differ by {differences:.4?}, order {order:.2}, centre of mass {centres:.4?}, order {order_of_centre:.2}, run-out {runouts:.3?}"
         );
-        assert!(differences[1] < 0.008 && order > least, "{aspect} {end}");
+        assert!(differences[1] < most && order > least, "{aspect} {end}");
         assert!(aspect < 3.0 || order_of_centre > 1.0, "{order_of_centre}");
     }
 }

@@ -35,6 +35,7 @@ pub mod precheck;
 pub mod settle;
 mod silo;
 pub mod step;
+mod step_table;
 mod surface_fields;
 mod surface_run;
 mod surface_steps;

@@ -33,7 +33,7 @@ pub const LOG: &str = "log.txt";
 pub const ANIMATION: &str = "animation.gif";
 
 /// Every file that a run, a campaign or a comparison writes.
-const OWN_FILES: [&str; 27] = [
+const OWN_FILES: [&str; 47] = [
     ANIMATION,
     SCENE,
     REPORT,
@@ -58,6 +58,26 @@ const OWN_FILES: [&str; 27] = [
     "estimators.csv",
     "continuum.csv",
     "pareto.csv",
+    "steps.csv",
+    "front.csv",
+    "deposit.csv",
+    "profiles.csv",
+    "flowing.csv",
+    "balance.csv",
+    "speeds.csv",
+    "map.csv",
+    "beside.csv",
+    "moves.csv",
+    "zones.csv",
+    "sides.csv",
+    "ends.csv",
+    "fronts.csv",
+    "boulders.csv",
+    "fragments.csv",
+    "free_form.csv",
+    "instalments.csv",
+    "samples.csv",
+    "stop_curve.csv",
     "rheology.toml",
     "campaign.json",
     "angles.json",

@@ -38,6 +38,7 @@ mod layer_case;
 pub mod layers;
 mod open_chute;
 mod overlap;
+mod overlap_width;
 mod settle;
 mod silo;
 mod tensile;

@@ -1,6 +1,9 @@
 //! The collapse of a column from the command line.
 
-use crate::command::{colluvium, succeed, summary, table, value};
+use crate::command::{
+    colluvium, shares_say_what_the_summary_says, steps_say_what_the_summary_says, succeed, summary,
+    table, value,
+};
 use colluvium::vtkhdf;
 use std::path::Path;
 use std::process::{Command, Stdio};
@@ -42,6 +45,7 @@ fn collapse_writes_front_and_deposit() {
     let report = std::fs::read_to_string(folder.path().join("c/report.html")).unwrap();
     assert!(report.contains("Profiles through time"));
     fields_say_what_the_tables_say(&folder.path().join("c"), &deposit);
+    steps_say_what_the_summary_says(&folder.path().join("c"));
 }
 
 /// The fields at rest: their volume, their columns' heights, and pressure under the weight above.
@@ -52,7 +56,7 @@ fn fields_say_what_the_tables_say(run: &Path, deposit: &[Vec<f64>]) {
     // Nothing flows before the column is let go or at the end; in between most of it does.
     let most = flowing.iter().map(|row| row[1]).fold(0.0, f64::max);
     assert!(flowing[0][1] == 0.0 && flowing.last().unwrap()[1] < 0.02 && most > 0.3);
-    assert!(flowing.iter().all(|row| (0.0..=row[1]).contains(&row[2])));
+    shares_say_what_the_summary_says(run);
     let last = frames.last().unwrap();
     let scalars = |name: &str| {
         let field = last.fields.iter().find(|f| f.name == name).unwrap();
@@ -261,8 +265,14 @@ fn goes_on_to_the_same_state(begun: &str, arguments: impl Fn(&'static str) -> Ve
     let hash = |out: &str| summary(&folder.path().join(out))["state_hash"].clone();
     assert_eq!(hash("whole"), hash("parts"));
     let text = |out: &str| std::fs::read_to_string(folder.path().join(out)).unwrap();
-    for name in ["front.csv", "balance.csv", "profiles.csv"] {
-        // A chute has no front, and what collapses no balance.
+    for name in [
+        "front.csv",
+        "balance.csv",
+        "profiles.csv",
+        "steps.csv",
+        "flowing.csv",
+    ] {
+        // A chute has no front, what collapses no balance, and grains neither steps of a solver nor cells.
         if folder.path().join("whole").join(name).exists() {
             assert_eq!(
                 text(&format!("whole/{name}")),
@@ -312,11 +322,44 @@ fn columns_of_any_law() {
             "rheology.table=[[0.01,0.4],[1.0,0.4]]",
         ],
     );
+    laws_with_a_yield_stress_rest_and_others_creep(folder.path());
     assert!(
         regularised < mu_i && regularised > 0.7 * mu_i,
         "{mu_i} {regularised}"
     );
     assert!((flat / coulomb - 1.0).abs() < 1e-3, "{flat} {coulomb}");
+}
+
+/// μ(I) comes to rest and says below which speeds; the regularised law still creeps, by what summary and report tell, and
+/// rises nowhere.
+fn laws_with_a_yield_stress_rest_and_others_creep(folder: &Path) {
+    let [rests, creeps] = ["mu-i", "barker-gray"].map(|out| summary(&folder.join(out)));
+    let report = |out: &str| std::fs::read_to_string(folder.join(out).join("report.html")).unwrap();
+    assert!(value(&rests, "largest_speed") < value(&rests, "rest_speed"));
+    assert!(rests["results"].get("creep_speed").is_none());
+    assert!(report("mu-i").contains("At rest: speeds below") && !report("mu-i").contains("creeps"));
+    assert!(creeps["results"]["time_of_rest"]["value"].is_null());
+    assert!(creeps["results"].get("rest_speed").is_none());
+    let (speed, fall) = (
+        value(&creeps, "creep_speed"),
+        value(&creeps, "top_fall_rate"),
+    );
+    assert_eq!(speed, value(&creeps, "largest_speed"));
+    assert!(
+        speed > 10.0 * value(&rests, "rest_speed") && (0.0..speed).contains(&fall),
+        "{speed} {fall}"
+    );
+    let (_, fronts) = table(&folder.join("barker-gray/front.csv"));
+    let [first, last] = [&fronts[fronts.len() - 11], &fronts[fronts.len() - 1]];
+    let told = (first[2] - last[2]) / (last[0] - first[0]);
+    assert!((fall - told).abs() < 1e-9 * speed, "{fall} {told}");
+    // The bundled column is 1 m high.
+    let scaled = value(&creeps, "creep_speed_scaled");
+    assert!(
+        (scaled * 9.81_f64.sqrt() / speed - 1.0).abs() < 1e-9,
+        "{scaled}"
+    );
+    assert!(report("barker-gray").contains("no yield stress"));
 }
 
 /// Side walls hold the material back.

@@ -1,6 +1,9 @@
 //! The collapse of a cylinder in space, from the command line.
 
-use crate::command::{colluvium, succeed, summary, table, value};
+use crate::command::{
+    colluvium, shares_say_what_the_summary_says, steps_say_what_the_summary_says, succeed, summary,
+    table, value,
+};
 use colluvium::vtkhdf;
 
 #[test]
@@ -29,6 +32,8 @@ fn cylinder_writes_front_deposit_and_fields() {
     );
     let found = summary(&folder.path().join("c"));
     assert_eq!(found["status"], "done");
+    steps_say_what_the_summary_says(&folder.path().join("c"));
+    shares_say_what_the_summary_says(&folder.path().join("c"));
     let runout = value(&found, "runout_over_aspect");
     assert!((0.93..1.69).contains(&runout), "{runout}");
     // The linear systems are solved to 1e-9, and so symmetric is the flow: 2e-12 on this grid.

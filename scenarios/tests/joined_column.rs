@@ -3,6 +3,7 @@
 use crate::command::{
     MOVING_EDGE, SMALL_JOINED_COLUMN, colluvium, hash, succeed, summary, table, value,
 };
+use colluvium_coupling::overlap::bowl::Reason;
 use std::path::Path;
 
 fn arguments<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
@@ -127,9 +128,14 @@ fn an_edge_that_moves_hands_grains_over_and_keeps_its_books() {
     assert_eq!(hash(&one), hash(&two));
     let (header, moves) = table(&one.join("moves.csv"));
     let column = |name: &str| header.iter().position(|h| h == name).unwrap();
-    let [mass, grains, edge] = ["mass", "grains", "edge"].map(column);
+    let [mass, grains, edge, reason] = ["mass", "grains", "edge", "reason"].map(column);
     println!("moves: {moves:?}");
     assert!(!moves.is_empty() && moves.iter().all(|row| row[mass] < 0.0));
+    // All of them because the grains beside the edge rested.
+    let rest = Reason::Rest.number() as f64;
+    assert!(moves.iter().all(|row| row[reason] == rest));
+    let told = summary(&one)["remarks"].to_string();
+    assert!(told.contains(&format!("{} by rest", moves.len())), "{told}");
     let pairs = moves.iter().zip(&moves[1..]);
     for (before, after) in pairs {
         assert!(after[grains] < before[grains]);
@@ -188,6 +194,13 @@ fn bad_joined_columns_are_refused_by_key() {
             "at most the buffer",
         ),
         (
+            &["overlap.width=0.6", "overlap.buffer_diameters=3"],
+            "overlap.width",
+            "left out where overlap.buffer_diameters",
+        ),
+        (&["overlap.width=0.1"], "overlap.width", "[0.2000, "),
+        (&["overlap.width=2.5"], "overlap.width", "leaves room"),
+        (
             &["overlap.load_time=1"],
             "overlap.load_time",
             "at most the time",
@@ -230,6 +243,56 @@ fn the_plan_says_where_grains_end_and_why() {
     ] {
         assert!(said.contains(word), "{word}: {said}");
     }
+}
+
+/// `overlap.width` halves itself between buffer and inner overlap: what the parts give that it stands for. Error against cost over
+/// it and the oracle's tolerance, beside full grains; a wider overlap has more grains.
+#[test]
+fn a_width_of_the_overlap_varies_with_the_tolerance() {
+    let folder = tempfile::tempdir().unwrap();
+    let planned = |sets: &[&str]| {
+        let mut plan = arguments("x", sets);
+        plan[0] = "plan";
+        plan.drain(2..4);
+        let said = succeed(folder.path(), &plan);
+        let from = said.find("overlap.width").unwrap();
+        said[from..].lines().next().unwrap().to_owned()
+    };
+    let [whole, parts] = [
+        &["overlap.width=0.8"][..],
+        &[
+            "overlap.inner_diameters=4",
+            "overlap.buffer_diameters=4",
+            "overlap.shell_diameters=2.6666666666666667",
+        ],
+    ]
+    .map(planned);
+    assert_eq!(whole, parts);
+    assert!(
+        whole.starts_with("overlap.width 0.8000 m, of which shell 2.7 d, buffer 4.0 d"),
+        "{whole}"
+    );
+    assert!(planned(&[]).starts_with("overlap.width 0.6000 m, of which shell 2.0 d, buffer 3.0 d"));
+
+    let mut arguments = arguments("p", &["duration_scaled=0.5"]);
+    arguments[0] = "pareto";
+    arguments.extend([
+        "--vary",
+        "overlap.width=0.6,0.8",
+        "--vary",
+        "zones.tolerance=0.2,0.4",
+    ]);
+    arguments.extend(["--reference", "model=dem"]);
+    succeed(folder.path(), &arguments);
+    let (header, rows) = table(&folder.path().join("p/pareto.csv"));
+    assert_eq!(header[..2], ["overlap.width", "zones.tolerance"]);
+    let values: Vec<&[f64]> = rows.iter().map(|row| &row[..2]).collect();
+    assert_eq!(values, [[0.6, 0.2], [0.6, 0.4], [0.8, 0.2], [0.8, 0.4]]);
+    let error = header.iter().position(|h| h == "error").unwrap();
+    assert!(
+        rows.iter().all(|row| row[error] > 0.0 && row[error] < 1.0),
+        "{rows:?}"
+    );
 }
 
 /// Share of the grain-steps that a plan predicts (%).

@@ -84,6 +84,30 @@ fn three_models_tell_of_one_flow() {
     let text = std::fs::read_to_string(at("hybrid").join("report.html")).unwrap();
     assert!(text.contains("Granular") || text.contains("Temperature of the grains"));
 
+    // Every step of the continuum is told; none had to be cut.
+    let steps = |name: &str| column(&at("continuum").join("steps.csv"), name);
+    let (times, residuals) = (steps("t"), steps("momentum_residual"));
+    let told = summary(&at("continuum"))["model"]["dt_s"].as_f64().unwrap();
+    assert!((times.len() as f64 * told / times.last().unwrap() - 1.0).abs() < 1e-9);
+    assert_eq!(steps("halvings").iter().sum::<f64>(), 0.0);
+    assert_eq!(
+        residuals.last(),
+        Some(&value(&summary(&at("continuum")), "residual"))
+    );
+
+    // All of it flows, and what is ill posed is part of it.
+    let told = summary(&at("continuum"));
+    let [flows, ill_posed] = ["flowing", "ill_posed"].map(|of| {
+        let shares = column(&at("continuum").join("history.csv"), &format!("{of}_share"));
+        let most = shares.into_iter().fold(0.0, f64::max);
+        assert_eq!(most, value(&told, &format!("largest_{of}_share")));
+        most
+    });
+    assert!(
+        flows > 0.99 && (0.0..=flows).contains(&ill_posed),
+        "{flows} {ill_posed}"
+    );
+
     // Grains above the edge were never made.
     assert!(value(&hybrid, "grain_steps_share") < 0.75);
     let steps = |name: &str| summary(&at(name))["cost"]["grain_steps"].as_u64().unwrap();

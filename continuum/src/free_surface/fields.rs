@@ -51,6 +51,18 @@ impl<const D: usize, const C: usize> CellFields<D, C> {
     }
 }
 
+/// Shares of the material's volume in cells of one size: that flows, and that flows where the equations of motion are
+/// ill posed, C(I) > 0.
+pub fn flowing_shares<const D: usize, const C: usize>(cells: &[CellFields<D, C>]) -> [f64; 2] {
+    let (mut flows, mut ill_posed, mut whole) = (0.0, 0.0, 0.0);
+    for cell in cells {
+        whole += cell.fraction;
+        flows += if cell.flows { cell.fraction } else { 0.0 };
+        ill_posed += if cell.well_posed { 0.0 } else { cell.fraction };
+    }
+    [flows, ill_posed].map(|part| if whole > 0.0 { part / whole } else { 0.0 })
+}
+
 impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R, D, C, V> {
     /// Fields of all cells with material, x fastest.
     pub fn cell_fields(&self) -> Vec<CellFields<D, C>> {

@@ -153,11 +153,12 @@ fn hybrid(
 /// Every setting with where its value comes from.
 fn say_settings(lines: &mut Lines, keys: &OverlapKeys, settings: &Resolved, d: f64) {
     let from = |given: bool| if given { "given" } else { "computed" };
+    let of = |part: Option<f64>| part.or(keys.width).is_some();
     for (key, value, given) in [
         ("cell", settings.cell, keys.cell_diameters.is_some()),
-        ("inner", settings.inner, keys.inner_diameters.is_some()),
-        ("buffer", settings.buffer, keys.buffer_diameters.is_some()),
-        ("shell", settings.shell, keys.shell_diameters.is_some()),
+        ("inner", settings.inner, of(keys.inner_diameters)),
+        ("buffer", settings.buffer, of(keys.buffer_diameters)),
+        ("shell", settings.shell, of(keys.shell_diameters)),
     ] {
         let text = format!(
             "overlap.{key}_diameters = {:.4} ({})",
@@ -166,6 +167,12 @@ fn say_settings(lines: &mut Lines, keys: &OverlapKeys, settings: &Resolved, d: f
         );
         lines.say("", &text);
     }
+    let width = settings.inner + settings.buffer;
+    let text = format!(
+        "overlap.width = {width:.4e} m, inner overlap and buffer together ({})",
+        from(keys.width.is_some())
+    );
+    lines.say("", &text);
     let kernel = match settings.kernel {
         StressKernel::Layer => "the mean over a cell".into(),
         StressKernel::Lucy(half_width) => format!("Lucy, {:.4} d", half_width / d),

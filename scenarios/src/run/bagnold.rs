@@ -9,7 +9,7 @@ use crate::state_hash;
 use crate::summary::{Model, Quantity, Summary};
 use crate::table::Table;
 use colluvium_continuum::bagnold::{BagnoldCase, BagnoldSolution};
-use colluvium_continuum::flow::{Marching, YieldMethod};
+use colluvium_continuum::flow::{Marching, StepRecord, YieldMethod};
 use colluvium_continuum::layer::{Options, Progress};
 use colluvium_continuum::rheology::ShearLaw;
 use std::ops::ControlFlow;
@@ -131,7 +131,8 @@ impl LayerVisitor for SteadyFlow<'_, '_> {
 
 /// Velocity and pressure profile and the history of the march.
 pub fn tables(solution: &BagnoldSolution) -> Vec<Table> {
-    let history = &solution.history;
+    let of_steps =
+        |value: &dyn Fn(&StepRecord) -> f64| solution.history.iter().map(value).collect();
     vec![
         Table::new("profile")
             .with("z", "m", solution.z.clone())
@@ -140,22 +141,28 @@ pub fn tables(solution: &BagnoldSolution) -> Vec<Table> {
             .with("u_exact", "m/s", solution.exact_u.clone())
             .with("p_exact", "Pa", solution.exact_p.clone()),
         Table::new("history")
-            .with("t", "s", history.iter().map(|r| r.time).collect())
-            .with("dt", "s", history.iter().map(|r| r.dt).collect())
+            .with("t", "s", of_steps(&|r| r.time))
+            .with("dt", "s", of_steps(&|r| r.dt))
+            .with("mean_velocity", "m/s", of_steps(&|r| r.mean_velocity))
+            .with("acceleration", "m/s²", of_steps(&|r| r.acceleration))
+            .with("linear_solves", "1", of_steps(&|r| r.linear_solves as f64))
+            .with("iterations", "1", of_steps(&|r| r.newton_iterations as f64))
+            .with("halvings", "1", of_steps(&|r| r.cuts as f64))
             .with(
-                "mean_velocity",
-                "m/s",
-                history.iter().map(|r| r.mean_velocity).collect(),
-            )
-            .with(
-                "acceleration",
-                "m/s²",
-                history.iter().map(|r| r.acceleration).collect(),
-            )
-            .with(
-                "linear_solves",
+                "momentum_residual",
                 "1",
-                history.iter().map(|r| r.linear_solves as f64).collect(),
+                of_steps(&|r| r.residuals.momentum),
+            )
+            .with(
+                "divergence_residual",
+                "1",
+                of_steps(&|r| r.residuals.divergence),
+            )
+            .with("stress_residual", "1", of_steps(&|r| r.residuals.stress))
+            .with(
+                "strain_rate_floor",
+                "1/s",
+                of_steps(&|r| r.residuals.strain_rate_floor / solution.units.time()),
             ),
     ]
 }

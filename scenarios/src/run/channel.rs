@@ -3,7 +3,7 @@
 use super::collapse::{self, options_of};
 use super::collapse_ground::contact;
 use super::surface_fields::space_frame;
-use super::surface_run::{self, Course, Followed};
+use super::surface_run::{self, Course, Deposit, Followed, yields};
 use super::{Findings, Under};
 use crate::failure::Failure;
 use crate::scene::CollapseScene;
@@ -12,7 +12,7 @@ use crate::table::Table;
 use crate::vtkhdf::Frame;
 use colluvium_continuum::Error;
 use colluvium_continuum::channel_collapse::{ChannelCase, ChannelCollapse};
-use colluvium_continuum::free_surface::{SpaceState, SurfaceOptions, SurfaceStep};
+use colluvium_continuum::free_surface::{SpaceState, SurfaceOptions, SurfaceStep, flowing_shares};
 use colluvium_continuum::strain::SPACE_COMPONENTS;
 use colluvium_continuum::units::Units;
 
@@ -85,6 +85,10 @@ impl Followed<3, SPACE_COMPONENTS> for Falling<'_> {
         vec![f.time, f.position, f.height, at_wall, inside]
     }
 
+    fn flowing_shares(&self) -> [f64; 2] {
+        flowing_shares(&self.collapse.flow().cell_fields())
+    }
+
     fn frame(&self) -> Frame {
         let collapse = &self.collapse;
         space_frame(
@@ -132,6 +136,8 @@ pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, 
             .with("x_inside", "m", course.column(4)),
         Table::new("deposit").with("x", "m", x).with("h", "m", h),
         course.profiles("x"),
+        course.flowing(),
+        course.steps.all.table(),
     ];
     Ok(Findings {
         summary,
@@ -185,7 +191,13 @@ fn describe(summary: &mut Summary, falling: &Falling, course: &Course) {
     ] {
         summary.put(name, Quantity::new(value, unit).from(source));
     }
-    surface_run::describe_rest(summary, collapse.time(), course);
+    surface_run::describe_shares(summary, course);
+    let deposit = Deposit {
+        height: 2,
+        rest_speed: collapse.rest_speed(),
+        yields: yields(collapse.rheology()),
+    };
+    surface_run::describe_rest(summary, falling, course, &deposit);
     surface_run::describe_steps(summary, falling, course, scene.solver.strain_rate_floor);
     let (x, _) = collapse.profile();
     if last[1] >= x.last().copied().unwrap_or(0.0) {

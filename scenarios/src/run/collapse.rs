@@ -3,7 +3,7 @@
 mod beside_continuum;
 
 use super::surface_fields::{SurfaceFields, field};
-use super::surface_run::{self, Course, Followed};
+use super::surface_run::{self, Course, Deposit, Followed, yields};
 use super::{Findings, Under, channel, collapse_ground, joined_column, world};
 use crate::failure::Failure;
 use crate::scene::{
@@ -14,7 +14,9 @@ use crate::table::Table;
 use crate::vtkhdf::{Cells, Frame, Values};
 use colluvium_continuum::Error;
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
-use colluvium_continuum::free_surface::{SurfaceOptions, SurfaceState, SurfaceStep, ThinLayer};
+use colluvium_continuum::free_surface::{
+    SurfaceOptions, SurfaceState, SurfaceStep, ThinLayer, flowing_shares,
+};
 use colluvium_continuum::rheology::ShearLaw;
 use colluvium_continuum::units::Units;
 use colluvium_continuum::wall_friction::{SideWalls, WallFriction};
@@ -171,14 +173,17 @@ impl<L: ShearLaw + Clone> Followed<2, 2> for Falling<'_, L> {
         self.collapse.profile()
     }
 
-    /// The front, and which share of the volume flows, and flows where the equations are ill posed.
+    /// The front.
     fn row(&self) -> Vec<f64> {
         let scene = self.scene;
         let f = self
             .collapse
             .front(scene.front_height_scaled * scene.height);
-        let [flows, ill] = self.collapse.flowing_shares();
-        vec![f.time, f.position, f.height, flows, ill]
+        vec![f.time, f.position, f.height]
+    }
+
+    fn flowing_shares(&self) -> [f64; 2] {
+        flowing_shares(&self.collapse.flow().cell_fields())
     }
 
     fn frame(&self) -> Frame {
@@ -289,17 +294,15 @@ fn tables<L: ShearLaw + Clone>(collapse: &Collapse<L>, course: &Course) -> Vec<T
             .with("height", "m", course.column(2)),
         on_ground(Table::new("deposit").with("x", "m", x).with("h", "m", h)),
         on_ground(course.profiles("x")),
-        Table::new("flowing")
-            .with("t", "s", course.column(0))
-            .with("flowing_share", "1", course.column(3))
-            .with("ill_posed_share", "1", course.column(4)),
+        course.flowing(),
+        course.steps.all.table(),
     ]
 }
 
 fn describe<L: ShearLaw + Clone>(summary: &mut Summary, falling: &Falling<L>, course: &Course) {
     let Falling { collapse, scene } = falling;
     summary.remarks.extend(scene.rheology.remarks());
-    let last = course.last().unwrap_or(&[0.0; 5]);
+    let last = course.last().unwrap_or(&[0.0; 3]);
     let [front, height] = [last[1], last[2]];
     let width = scene.height / scene.aspect;
     let mut put = |name: &str, value: f64, unit: &str, source: &str| {
@@ -318,19 +321,13 @@ fn describe<L: ShearLaw + Clone>(summary: &mut Summary, falling: &Falling<L>, co
         "(x_front − width)/width",
     );
     put("deposit_height", height, "m", "greatest height at the end");
-    put(
-        "largest_flowing_share",
-        course.largest(3),
-        "1",
-        "of the volume, at any instant of flowing.csv",
-    );
-    put(
-        "largest_ill_posed_share",
-        course.largest(4),
-        "1",
-        "of the volume: flows where short waves grow without bound, C(I) > 0",
-    );
-    surface_run::describe_rest(summary, collapse.time(), course);
+    surface_run::describe_shares(summary, course);
+    let deposit = Deposit {
+        height: 2,
+        rest_speed: collapse.rest_speed(),
+        yields: yields(collapse.rheology()),
+    };
+    surface_run::describe_rest(summary, falling, course, &deposit);
     surface_run::describe_steps(summary, falling, course, scene.solver.strain_rate_floor);
     let (x, _) = collapse.profile();
     if front >= x.last().copied().unwrap_or(0.0) {

@@ -3,6 +3,7 @@
 use super::bagnold::failure;
 use super::joined_incline::{self, findings, keys};
 use super::precheck::stand_in_bed;
+use super::step_table::StepTable;
 use super::{Findings, Under, incline};
 use crate::cost::Cost;
 use crate::failure::Failure;
@@ -89,13 +90,15 @@ pub(super) fn check(scene: &Scene, body: &InclineScene) -> Result<(), Failure> {
         .map_err(|error| Failure::Input(format!("{}: {error}", scene.origin)))
 }
 
-/// What is summed up beside the state: u, p, τ by cell, samples, and rows (t, mean and surface velocity).
+/// What is summed up beside the state: u, p, τ by cell, samples, and rows (t, mean and surface velocity, and the shares that have yielded
+/// and that have yielded where the equations are ill posed).
 #[derive(Clone, Debug, Default)]
 struct Course {
     sums: Vec<f64>,
     samples: u64,
     steps: u64,
-    history: Vec<[f64; 3]>,
+    history: Vec<[f64; 5]>,
+    all: StepTable,
 }
 
 impl Course {
@@ -103,7 +106,12 @@ impl Course {
         let cells = column.cells();
         let velocities = (0..cells).map(|k| column.velocity(k));
         let mean = velocities.sum::<f64>() / cells as f64;
-        self.history.push([time, mean, column.velocity(cells - 1)]);
+        let [flows, ill_posed] = column.yielded_and_ill_posed();
+        let surface = column.velocity(cells - 1);
+        self.history.push([time, mean, surface, flows, ill_posed]);
+        for part in column.parts() {
+            self.all.book_layer(part, column.units());
+        }
         if !measures {
             return;
         }
@@ -143,6 +151,7 @@ impl Course {
         put("course/history", self.history.as_flattened().to_vec());
         let counts = vec![self.samples, self.steps];
         record.counts.insert("course/counts".into(), counts);
+        self.all.put_into(&mut record);
         record
     }
 
@@ -159,13 +168,15 @@ impl Course {
             s: record.numbers("flow/s")?.as_chunks::<2>().0.to_vec(),
         };
         column.take_up(state, time)?;
+        let all =
+            StepTable::of(record).ok_or("array `course/step_rows` is not ten numbers a step")?;
         let sums = record.numbers("course/sums")?.to_vec();
         if sums.len() != 3 * column.cells() {
             return Err("array `course/sums` is not three numbers a cell".into());
         }
         let history = record
             .numbers("course/history")?
-            .as_chunks::<3>()
+            .as_chunks::<5>()
             .0
             .to_vec();
         Ok(Course {
@@ -173,6 +184,7 @@ impl Course {
             samples,
             steps,
             history,
+            all,
         })
     }
 }
@@ -265,6 +277,19 @@ fn found(
         "1",
         "of momentum in the last step, over gravity",
     );
+    let largest = |at: usize| course.history.iter().map(|row| row[at]).fold(0.0, f64::max);
+    told(
+        "largest_flowing_share",
+        largest(3),
+        "1",
+        "of the volume, at any instant of history.csv",
+    );
+    told(
+        "largest_ill_posed_share",
+        largest(4),
+        "1",
+        "of the volume: has yielded where short waves grow without bound, C(I) > 0",
+    );
     summary.remarks.extend(rheology.remarks());
     let profile = course.rows(column.spacing());
     let rows = |at: usize| course.history.iter().map(|row| row[at]).collect();
@@ -275,7 +300,10 @@ fn found(
             Table::new("history")
                 .with("t", "s", rows(0))
                 .with("mean_velocity", "m/s", rows(1))
-                .with("surface_velocity", "m/s", rows(2)),
+                .with("surface_velocity", "m/s", rows(2))
+                .with("flowing_share", "1", rows(3))
+                .with("ill_posed_share", "1", rows(4)),
+            course.all.table(),
         ],
         grains: None,
     }

@@ -3,7 +3,7 @@
 use super::collapse::options_of;
 use super::collapse_ground::contact;
 use super::surface_fields::space_frame;
-use super::surface_run::{self, Course, Followed};
+use super::surface_run::{self, Course, Deposit, Followed, yields};
 use super::{Findings, Under, cylinder_ground};
 use crate::failure::Failure;
 use crate::scene::{CylinderScene, Scene};
@@ -12,7 +12,7 @@ use crate::table::Table;
 use crate::vtkhdf::Frame;
 use colluvium_continuum::Error;
 use colluvium_continuum::cylinder_collapse::{CylinderCase, CylinderCollapse};
-use colluvium_continuum::free_surface::{SpaceState, SurfaceStep};
+use colluvium_continuum::free_surface::{SpaceState, SurfaceStep, flowing_shares};
 use colluvium_continuum::strain::SPACE_COMPONENTS;
 use colluvium_continuum::units::Units;
 
@@ -127,6 +127,10 @@ impl Followed<3, SPACE_COMPONENTS> for Falling<'_> {
         ]
     }
 
+    fn flowing_shares(&self) -> [f64; 2] {
+        flowing_shares(&self.collapse.flow().cell_fields())
+    }
+
     fn frame(&self) -> Frame {
         frame(&self.collapse)
     }
@@ -173,6 +177,8 @@ fn tables(collapse: &CylinderCollapse, course: &Course) -> Vec<Table> {
             .with("r_diagonal", "m", column(3)),
         Table::new("deposit").with("r", "m", r).with("h", "m", h),
         course.profiles("r"),
+        course.flowing(),
+        course.steps.all.table(),
     ]
 }
 
@@ -210,6 +216,8 @@ fn tables_over_ground(collapse: &CylinderCollapse, course: &Course) -> Vec<Table
             .with("y", "m", y)
             .with("z_ground", "m", collapse.ground_heights().to_vec())
             .with("h", "m", collapse.heights()),
+        course.flowing(),
+        course.steps.all.table(),
     ]
 }
 
@@ -286,7 +294,13 @@ fn describe(summary: &mut Summary, falling: &Falling, course: &Course, wall_s: f
         "1",
         "bytes: peak memory of the process over cells with a pressure",
     );
-    surface_run::describe_rest(summary, collapse.time(), course);
+    surface_run::describe_shares(summary, course);
+    let deposit = Deposit {
+        height: 4,
+        rest_speed: collapse.rest_speed(),
+        yields: yields(collapse.rheology()),
+    };
+    surface_run::describe_rest(summary, falling, course, &deposit);
     surface_run::describe_steps(summary, falling, course, scene.solver.strain_rate_floor);
     let (r, _) = collapse.profile();
     let farthest = match scene.terrain {

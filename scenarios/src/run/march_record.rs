@@ -34,7 +34,8 @@ pub fn save<L: Rheology>(run: &LayerRun<L>) -> Record {
     });
     numbers("history/numbers", steps.collect());
     let solves = march.history.iter();
-    let solves = solves.flat_map(|r| [r.newton_iterations as u64, r.linear_solves as u64]);
+    let solves =
+        solves.flat_map(|r| [r.newton_iterations, r.linear_solves, r.cuts].map(|n| n as u64));
     let mut counts = |name: &str, values: Vec<u64>| {
         record.counts.insert(name.into(), values);
     };
@@ -49,12 +50,12 @@ pub fn take_up<L: Rheology>(run: &mut LayerRun<L>, record: &Record) -> Result<()
         return Err("array `flow/march` must have 3 numbers".into());
     };
     let numbers = record.numbers("history/numbers")?.as_chunks::<NUMBERS>();
-    let solves = record.counts("history/solves")?.as_chunks::<2>();
+    let solves = record.counts("history/solves")?.as_chunks::<3>();
     if numbers.0.len() != solves.0.len() || !numbers.1.is_empty() || !solves.1.is_empty() {
         return Err("arrays `history/numbers` and `history/solves` do not fit each other".into());
     }
     let history = numbers.0.iter().zip(solves.0);
-    let history = history.map(|(numbers, &[newton, linear])| {
+    let history = history.map(|(numbers, &[newton, linear, cuts])| {
         let &[
             time,
             dt,
@@ -70,6 +71,7 @@ pub fn take_up<L: Rheology>(run: &mut LayerRun<L>, record: &Record) -> Result<()
             dt,
             newton_iterations: newton as usize,
             linear_solves: linear as usize,
+            cuts: cuts as usize,
             residuals: Residuals {
                 momentum,
                 divergence,

@@ -10,7 +10,7 @@ use crate::summary::{Quantity, Summary};
 use crate::table::Table;
 use crate::vtkhdf::{Cells, Frame};
 use colluvium_continuum::Error;
-use colluvium_continuum::free_surface::{SurfaceState, SurfaceStep};
+use colluvium_continuum::free_surface::{SurfaceState, SurfaceStep, flowing_shares};
 use colluvium_continuum::open_chute::{Feed, OpenChute, OpenChuteCase};
 use colluvium_continuum::rheology::ShearLaw;
 use colluvium_continuum::units::Units;
@@ -122,6 +122,10 @@ impl<L: ShearLaw + Clone> Followed<2, 2> for Fed<'_, L> {
         vec![self.chute.time(), volume, entered, left]
     }
 
+    fn flowing_shares(&self) -> [f64; 2] {
+        flowing_shares(&self.chute.flow().cell_fields())
+    }
+
     /// Cells with material as quadrilaterals: x along the chute, z normal to it.
     fn frame(&self) -> Frame {
         let cells = self.chute.fields();
@@ -201,6 +205,8 @@ fn tables<L: ShearLaw + Clone>(
             .with("left", "m²", course.column(3)),
         course.profiles("x"),
         speeds,
+        course.flowing(),
+        course.steps.all.table(),
     ]
 }
 
@@ -250,6 +256,7 @@ fn describe<L: ShearLaw + Clone>(
             "relative L2 distance half way down from the steady profile of a layer as deep as what enters",
         );
     }
+    surface_run::describe_shares(summary, course);
     surface_run::describe_steps(summary, fed, course, scene.solver.strain_rate_floor);
     let room = scene.grid.room_scaled * scene.depth;
     let deepest = depths.iter().fold(0.0_f64, |most, h| most.max(*h));

@@ -13,6 +13,7 @@ use crate::table::Table;
 use crate::vtkhdf::Frame;
 use colluvium_continuum::Error;
 use colluvium_continuum::free_surface::{SurfaceState, SurfaceStep};
+use colluvium_continuum::rheology::ShearLaw;
 use colluvium_continuum::units::Units;
 use colluvium_dem::Record;
 
@@ -36,6 +37,8 @@ pub(super) trait Followed<const D: usize, const C: usize> {
     fn profile(&self) -> (Vec<f64>, Vec<f64>);
     /// What is noted at every instant, the time first.
     fn row(&self) -> Vec<f64>;
+    /// Shares of the material's volume: that flows, and that flows where the equations are ill posed.
+    fn flowing_shares(&self) -> [f64; 2];
     /// The fields of now.
     fn frame(&self) -> Frame;
     /// Heights of the ground, if there is any: a run goes on over the same only.
@@ -51,6 +54,8 @@ pub(super) struct Course {
     rows: Vec<f64>,
     /// Numbers of a row.
     width: usize,
+    /// Which share of the volume flows and flows where the equations are ill posed, at every instant of the rows.
+    shares: Vec<[f64; 2]>,
     /// Time, place and height, row by row.
     profiles: [Vec<f64>; 3],
     /// Heights of the ground; none on a level floor.
@@ -74,6 +79,7 @@ impl Course {
         let row = flow.row();
         if self.last().is_none_or(|last| last[0] < row[0]) {
             self.rows.extend(row);
+            self.shares.push(flow.flowing_shares());
         }
     }
 
@@ -96,9 +102,26 @@ impl Course {
         rows.map(|row| row[number]).collect()
     }
 
+    /// How fast a height falls (m/s) over the last instants.
+    fn fall(&self, number: usize) -> f64 {
+        let last = self.shares.len().saturating_sub(1);
+        let first = last.saturating_sub(FALL);
+        let [times, heights] = [self.column(0), self.column(number)];
+        (heights[first] - heights[last]) / (times[last] - times[first])
+    }
+
     /// The largest number of a column, at least 0.
     pub fn largest(&self, number: usize) -> f64 {
         self.column(number).into_iter().fold(0.0, f64::max)
+    }
+
+    /// The table of shares that flow, and flow where the equations are ill posed.
+    pub fn flowing(&self) -> Table {
+        let share = |number: usize| self.shares.iter().map(|s| s[number]).collect();
+        Table::new("flowing")
+            .with("t", "s", self.column(0))
+            .with("flowing_share", "1", share(0))
+            .with("ill_posed_share", "1", share(1))
     }
 
     /// The table of profiles over the places of this name.
@@ -114,6 +137,7 @@ impl Course {
         let mut record = Record::default();
         for (name, values) in [
             ("course/rows", self.rows.clone()),
+            ("course/shares", self.shares.as_flattened().to_vec()),
             ("course/profiles", self.profiles.concat()),
             ("ground", self.ground.clone()),
         ] {
@@ -135,12 +159,13 @@ impl Course {
         let rows = numbers("course/rows")?.clone();
         let course = Course {
             width: self.width,
+            shares: numbers("course/shares")?.as_chunks().0.to_vec(),
             profiles: columns(numbers("course/profiles")?),
             ground: numbers("ground").cloned().unwrap_or_default(),
             steps: Steps::of(record)?,
             rows,
         };
-        let fits = course.rows.len().is_multiple_of(self.width.max(1));
+        let fits = course.rows.len() == course.shares.len() * self.width;
         fits.then_some(())?;
         Some((course, state_of(record)?))
     }
@@ -179,7 +204,10 @@ pub(super) fn follow<const D: usize, const C: usize>(
         // Steps end at the instants of the tables, whenever a run was begun or resumed.
         let next = (flow.time() / end * FRONTS + 1e-6).floor() + 1.0;
         let step = flow.step((next / FRONTS * end).min(end)).map_err(failure)?;
-        course.steps.book(&step, flow.is_at_rest(&step));
+        let (at_rest, volume_error) = (flow.is_at_rest(&step), flow.volume_drift());
+        course
+            .steps
+            .book(&step, at_rest, flow.units(), volume_error);
         if (flow.time() / end * FRONTS - next).abs() < 1e-6 {
             course.see(flow);
             if (next * PROFILES / FRONTS).fract() < 1e-6 {
@@ -262,11 +290,89 @@ pub(super) fn describe_steps<const D: usize, const C: usize>(
     );
 }
 
-/// Says when a run came to rest.
-pub(super) fn describe_rest(summary: &mut Summary, time: f64, course: &Course) {
-    let time = if course.steps.rest() { time } else { f64::NAN };
+/// Says which shares of the material flowed, and flowed where the equations are ill posed.
+pub(super) fn describe_shares(summary: &mut Summary, course: &Course) {
+    let largest = |number: usize| {
+        let all = course.shares.iter().map(|s| s[number]);
+        Quantity::new(all.fold(0.0, f64::max), "1")
+    };
+    summary.put(
+        "largest_flowing_share",
+        largest(0).from("of the volume, at any instant of flowing.csv"),
+    );
+    summary.put(
+        "largest_ill_posed_share",
+        largest(1).from("of the volume: flows where short waves grow without bound, C(I) > 0"),
+    );
+}
+
+/// What a deposit's rest or creep is told from.
+pub(super) struct Deposit {
+    /// Which number of a row is its greatest height (m).
+    pub height: usize,
+    /// Speed (m/s) below which everything is at rest.
+    pub rest_speed: f64,
+    /// Whether the material bears shear at rest: without a yield stress every slope creeps.
+    pub yields: bool,
+}
+
+/// Whether a law has a yield stress.
+pub(super) fn yields(law: &impl ShearLaw) -> bool {
+    law.friction_limits()[0] > 0.0 || law.cohesion() > 0.0
+}
+
+/// Instants over which the fall of a top is taken.
+const FALL: usize = 10;
+
+/// Says when a run came to rest and what rest is, or how fast the deposit of a law without yield stress creeps.
+pub(super) fn describe_rest<const D: usize, const C: usize>(
+    summary: &mut Summary,
+    flow: &impl Followed<D, C>,
+    course: &Course,
+    deposit: &Deposit,
+) {
+    let rests = course.steps.rest();
+    let time = if rests { flow.time() } else { f64::NAN };
     summary.put(
         "time_of_rest",
         Quantity::new(time, "s").from("speeds below 5 ε height; null where the run ended before"),
     );
+    let unit = flow.units().velocity;
+    if rests {
+        summary.put(
+            "rest_speed",
+            Quantity::new(deposit.rest_speed, "m/s").from("at rest all speeds are below it"),
+        );
+        summary.remarks.push(format!(
+            "At rest: speeds below {:.2e} m/s, {:.1e} √(gravity height).",
+            deposit.rest_speed,
+            deposit.rest_speed / unit
+        ));
+    }
+    if deposit.yields {
+        return;
+    }
+    let speed = course.steps.last.max_speed * unit;
+    let fall = course.fall(deposit.height);
+    for (name, value, what) in [
+        ("creep_speed", speed, "largest speed at the end"),
+        (
+            "top_fall_rate",
+            fall,
+            "of the greatest height, over the last ten instants of front.csv",
+        ),
+    ] {
+        summary.put(name, Quantity::new(value, "m/s").from(what));
+        summary.put(
+            &format!("{name}_scaled"),
+            Quantity::new(value / unit, "1").from("over √(gravity height)"),
+        );
+    }
+    summary.remarks.push(format!(
+        "This law has no yield stress, so every slope of the deposit creeps for ever: at the end of the run its fastest \
+         material moves with {speed:.2e} m/s, {:.1e} √(gravity height), and its top falls with {fall:.2e} m/s, {:.1e} \
+         √(gravity height).",
+        speed / unit,
+        fall / unit
+    ));
 }

@@ -1,10 +1,12 @@
 //! Flows with a moving surface: what their steps add up to, and their state in checkpoints.
 
 use super::Under;
+use super::step_table::StepTable;
 use crate::failure::Failure;
 use crate::frames;
 use crate::summary::{Quantity, Summary};
 use colluvium_continuum::free_surface::{History, SurfaceState, SurfaceStep};
+use colluvium_continuum::units::Units;
 use colluvium_dem::Record;
 
 /// Instants of the front over the duration.
@@ -23,10 +25,14 @@ pub(super) struct Steps {
     counts: [u64; 5],
     /// Largest residuals of momentum, divergence and stress of any step.
     residuals: [f64; 3],
+    /// Each of them.
+    pub all: StepTable,
 }
 
 impl Steps {
-    pub fn book(&mut self, step: &SurfaceStep, at_rest: bool) {
+    /// Adds a step, after which everything may be at rest and volume was gained.
+    pub fn book(&mut self, step: &SurfaceStep, at_rest: bool, units: &Units, volume_error: f64) {
+        self.all.book(step, units, volume_error);
         let [steps, iterations, cuts, cell_steps, resting] = &mut self.counts;
         *steps += 1;
         *iterations += step.newton_iterations as u64;
@@ -62,6 +68,7 @@ impl Steps {
         put("course/step", vec![self.last.dt, self.last.max_speed]);
         let counts = self.counts.to_vec();
         record.counts.insert("course/counts".into(), counts);
+        self.all.put_into(record);
     }
 
     pub fn of(record: &Record) -> Option<Self> {
@@ -76,6 +83,7 @@ impl Steps {
             },
             counts: counts.clone().try_into().ok()?,
             residuals: residuals.clone().try_into().ok()?,
+            all: StepTable::of(record)?,
         })
     }
 

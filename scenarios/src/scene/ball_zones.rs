@@ -201,8 +201,7 @@ impl BallImpactScene {
 
     /// Width of the overlap (m).
     fn overlap_width(&self, diameter: f64) -> f64 {
-        let widths = [self.overlap.inner_diameters, self.overlap.buffer_diameters];
-        widths.iter().map(|w| w.unwrap_or(3.0) * diameter).sum()
+        self.overlap.how_wide().whole(diameter)
     }
 
     /// Half of the box's edges along x and y (m), given or computed.
@@ -360,6 +359,9 @@ impl BallImpactScene {
             return Ok(());
         }
         let materials = self.materials(origin)?;
+        let d = self.grain_diameter(&materials);
+        // Which edges the box then has room for is said of the edges.
+        self.overlap.how_wide().check(d, f64::INFINITY, origin)?;
         self.overlap_settings(origin)?;
         let zones = &self.zones;
         if let (Some(budget), false) = (zones.budget, zones.moving) {
@@ -410,7 +412,6 @@ impl BallImpactScene {
                 "moderate, gravel or glass, or mu_s, mu_2 and i_0 given: the continuum needs a law";
             return Err(at("continuum").refuse("calibrated", "none", range));
         }
-        let d = self.grain_diameter(&materials);
         let [half, depth] = [self.half_width(d), self.zone_depth(d)];
         let overlap = self.overlap_width(d);
         self.check_edges(origin, overlap)?;

@@ -1,5 +1,6 @@
 //! Keys of a column that is grains in front and a continuum behind, of the collapse with `model = "hybrid"`.
 
+use super::overlap_width::OverlapWidth;
 use super::world::Place;
 use super::{CollapseScene, SceneError};
 use colluvium_coupling::overlap::material_edge::Travel;
@@ -79,6 +80,11 @@ fn holds() -> f64 {
 #[derive(Clone, Debug, Default, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct ColumnOverlapKeys {
+    /// Width of the overlap as a whole (m): half of it buffer, half inner overlap, and the shell a third of it within the
+    /// buffer, as where nothing is given. Instead of those three.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
+    pub width: Option<f64>,
     /// Width of the inner overlap, where stresses of grains enter the continuum, in diameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
@@ -131,14 +137,26 @@ pub struct ColumnOverlapKeys {
 }
 
 impl ColumnOverlapKeys {
+    /// How wide it is.
+    pub(super) fn how_wide(&self) -> OverlapWidth {
+        OverlapWidth {
+            width: self.width,
+            parts: [
+                self.inner_diameters,
+                self.buffer_diameters,
+                self.shell_diameters,
+            ],
+        }
+    }
+
     /// The settings, for grains of this mean diameter (m) and this √(d/g) (s).
     pub(super) fn settings(&self, diameter: f64, time: f64) -> OverlapSettings {
         let soon = Some(TOGETHER * time);
-        let length = |diameters: Option<f64>| diameters.map(|n| n * diameter);
+        let [inner, buffer, shell] = self.how_wide().parts(diameter);
         OverlapSettings {
-            inner: length(self.inner_diameters),
-            buffer: length(self.buffer_diameters),
-            shell: length(self.shell_diameters),
+            inner,
+            buffer,
+            shell,
             stress_time: self.stress_time,
             relaxation_time: self.relaxation_time.or(soon),
             following_time: self.following_time.or(soon),
@@ -156,8 +174,9 @@ impl ColumnOverlapKeys {
 /// An overlap in words, for grains of this diameter (m).
 pub fn overlap_words(s: &Resolved, d: f64) -> String {
     format!(
-        "shell {:.1} d, buffer {:.1} d, inner overlap {:.1} d; loads held {:.2e} s, exchange every {:.2e} s, stresses averaged over \
+        "overlap.width {:.4} m, of which shell {:.1} d, buffer {:.1} d (the shell in it), inner overlap {:.1} d; loads held {:.2e} s, exchange every {:.2e} s, stresses averaged over \
          {:.2e} s, relaxation {:.2e} s, following {:.2e} s, impedance {:.3e} Pa s/m",
+        s.inner + s.buffer,
         s.shell / d,
         s.buffer / d,
         s.inner / d,
@@ -231,8 +250,7 @@ impl CollapseScene {
             Some(scaled) => scaled * self.height,
             None => {
                 let d = self.grains.diameter;
-                let widths = [self.overlap.inner_diameters, self.overlap.buffer_diameters];
-                let overlap: f64 = widths.iter().map(|w| w.unwrap_or(3.0) * d).sum();
+                let overlap = self.overlap.how_wide().whole(d);
                 self.width() - (FLOWS * self.height).max(overlap + LEAST_GRAINS * d)
             }
         }
@@ -299,8 +317,10 @@ impl CollapseScene {
     pub(super) fn check_zones(&self, origin: &str) -> Result<(), SceneError> {
         self.check_grains(origin)?;
         let at = |section| Place { origin, section };
-        let settings = self.overlap_settings(origin)?;
         let (d, h) = (self.grains.diameter, self.height);
+        let [behind, room] = self.edge_range(0.0);
+        self.overlap.how_wide().check(d, room - behind, origin)?;
+        let settings = self.overlap_settings(origin)?;
         let overlap = settings.inner + settings.buffer;
         let [least, most] = self.edge_range(overlap).map(|x| x / h);
         if least >= most {

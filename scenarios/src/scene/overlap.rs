@@ -1,5 +1,6 @@
 //! Keys of an incline that is grains, continuum, or both.
 
+use super::overlap_width::OverlapWidth;
 use super::{FrictionLaw, InclineScene, RheologyKeys, SceneError};
 use colluvium_coupling::overlap::{NormalMotion, OverlapSettings, StressKernel};
 use schemars::JsonSchema;
@@ -44,6 +45,11 @@ pub struct OverlapKeys {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 0.25, "maximum" = 100.0))]
     pub cell_diameters: Option<f64>,
+    /// Width of the overlap as a whole (m): half of it buffer, half inner overlap, and the shell a third of it within the
+    /// buffer, as where nothing is given. Instead of those three.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
+    pub width: Option<f64>,
     /// Width of the inner overlap, where stresses of grains enter the continuum, in diameters.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
@@ -107,14 +113,27 @@ pub enum NormalMotionKind {
 }
 
 impl OverlapKeys {
+    /// How wide it is.
+    pub(super) fn how_wide(&self) -> OverlapWidth {
+        OverlapWidth {
+            width: self.width,
+            parts: [
+                self.inner_diameters,
+                self.buffer_diameters,
+                self.shell_diameters,
+            ],
+        }
+    }
+
     /// The settings, for grains of this mean diameter (m).
     pub fn settings(&self, diameter: f64) -> OverlapSettings {
         let length = |diameters: Option<f64>| diameters.map(|n| n * diameter);
+        let [inner, buffer, shell] = self.how_wide().parts(diameter);
         OverlapSettings {
             cell: length(self.cell_diameters),
-            inner: length(self.inner_diameters),
-            buffer: length(self.buffer_diameters),
-            shell: length(self.shell_diameters),
+            inner,
+            buffer,
+            shell,
             kernel: length(self.kernel_diameters).map_or(StressKernel::Layer, StressKernel::Lucy),
             stress_time: self.stress_time,
             relaxation_time: self.relaxation_time,
@@ -212,6 +231,10 @@ impl InclineScene {
         }) = rheology.mu_i().validate()
         {
             return out_of_range(key, value.to_string(), allowed);
+        }
+        if self.model == InclineModel::Hybrid {
+            let (d, height) = (self.grains.diameter, overlap.height_diameters);
+            overlap.how_wide().check(d, height * d, origin)?;
         }
         // At the end of an average window both models have to have one.
         if self.model == InclineModel::Hybrid && overlap.from > self.time.relax {

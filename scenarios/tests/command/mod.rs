@@ -59,6 +59,51 @@ pub const MOVING_EDGE: &[&str] = &[
     "zones.hold_scaled=0.1",
 ];
 
+/// Every step of a continuum run stands in `steps.csv`, and what the summary says of the steps follows from it.
+pub fn steps_say_what_the_summary_says(run: &Path) {
+    let (header, rows) = table(&run.join("steps.csv"));
+    let column = |name: &str| -> Vec<f64> {
+        let at = header.iter().position(|h| h == name).unwrap();
+        rows.iter().map(|row| row[at]).collect()
+    };
+    let sum = |name: &str| column(name).iter().sum::<f64>();
+    let most = |name: &str| column(name).into_iter().fold(0.0, f64::max);
+    let found = summary(run);
+    assert_eq!(rows.len() as f64, value(&found, "steps"));
+    assert_eq!(sum("iterations"), value(&found, "newton_iterations"));
+    assert_eq!(sum("halvings"), value(&found, "steps_cut"));
+    for name in ["momentum", "divergence", "stress"].map(|of| format!("{of}_residual")) {
+        let largest = value(&found, &name);
+        assert!(largest > 0.0 && most(&name) == largest, "{name} {largest}");
+    }
+    // Each step was accepted at the floor that was asked for, and begins where the one before ended.
+    let asked = value(&found, "strain_rate_floor");
+    assert!((most("strain_rate_floor") / asked - 1.0).abs() < 1e-9);
+    let (times, lengths) = (column("t"), column("dt"));
+    for (n, (t, dt)) in times.iter().zip(&lengths).enumerate() {
+        let before = if n == 0 { 0.0 } else { times[n - 1] };
+        assert!((before + dt - t).abs() < 1e-9 * t, "{n}: {before} {dt} {t}");
+    }
+    assert!(column("volume_error").iter().all(|v| v.abs() < 1e-12));
+    assert_eq!(
+        column("largest_speed").last(),
+        Some(&value(&found, "largest_speed"))
+    );
+}
+
+/// What flows where the equations are ill posed is part of what flows, and the summary tells the largest shares.
+pub fn shares_say_what_the_summary_says(run: &Path) {
+    let (header, rows) = table(&run.join("flowing.csv"));
+    assert_eq!(header, ["t", "flowing_share", "ill_posed_share"]);
+    assert!(rows.iter().all(|row| (0.0..=1.0).contains(&row[1])));
+    assert!(rows.iter().all(|row| (0.0..=row[1]).contains(&row[2])));
+    let most = |at: usize| rows.iter().map(|row| row[at]).fold(0.0, f64::max);
+    let found = summary(run);
+    assert_eq!(most(1), value(&found, "largest_flowing_share"));
+    assert_eq!(most(2), value(&found, "largest_ill_posed_share"));
+    assert!(most(1) > 0.3, "{}", most(1));
+}
+
 /// Runs `colluvium` in a folder.
 pub fn colluvium(folder: &Path, arguments: &[&str]) -> Output {
     Command::new(env!("CARGO_BIN_EXE_colluvium"))

@@ -18,6 +18,17 @@ const ASWAN: [f64; 6] = [28.0, 15.0, 70.0, 22.0, 0.98, 10.0];
 const ASWAN_SOURCE: &str = "Kappel et al. 2020, §4.2, from 270 000 parcels";
 /// Height of that cliff (m).
 const ASWAN_HEIGHT: f64 = 130.0;
+/// Diameter of its smallest grains (m).
+const ASWAN_GRAINS: f64 = 3.0e-3;
+
+/// What §3.2 and 4.2 say of the cliffs of this height (m): no height, run-out or angle of a pile, and no survival of bonds.
+const CLIFF_HEIGHT: f64 = 30.0;
+const CLIFF_SOURCE: &str = "Kappel et al. 2020, §4.2, from 60 000 to 70 000 parcels";
+/// Overhangs (degrees), and the smallest grains (m) of those of which such a cliff barely stands.
+const CLIFF_GRAINS: [[f64; 2]; 3] = [[10.0, 6.0e-3], [20.0, 4.0e-3], [30.0, 2.0e-3]];
+/// Free fall from its top, "about 10 min", and the longest collapse with the settling of the debris (s).
+const CLIFF_FALL: f64 = 600.0;
+const CLIFF_REST: f64 = 3600.0;
 
 impl CliffScene {
     pub(super) fn put_times(&self, record: &CliffRecord, ran: &Ran, summary: &mut Summary) {
@@ -30,35 +41,17 @@ impl CliffScene {
             summary.put(name, Quantity::new(value, unit).from(source));
         };
         put(
-            "stood",
-            f64::from(u8::from(stood)),
-            "1",
-            "1 if it stood until the crack opened",
-        );
-        put(
             "time_of_failure",
             since(times.failed),
             "s",
             "after the crack opened, or after the support was taken away where it did not stand: what stood before the crack \
              has sunk by a hundredth of the face's height; null where it did not",
         );
-        put(
-            "time_of_impact",
-            since(times.peak[1]),
-            "s",
-            "the same, of the largest kinetic energy; a free fall of 30 m takes 577 s (some 10 minutes in the paper)",
-        );
         let end = if rests {
             since(ran.simulation.time())
         } else {
             f64::NAN
         };
-        put(
-            "time_of_rest",
-            end,
-            "s",
-            "the same, of rest: up to 3600 s in the paper; null where the run ended before",
-        );
         put(
             "sunk_standing",
             times.sunk_standing,
@@ -71,6 +64,50 @@ impl CliffScene {
             "1",
             "in the crack, that lost their cohesion",
         );
+        let fall = (2.0 * (self.shape.height - self.shape.wall) / self.gravity).sqrt();
+        let free = format!(
+            "the same, of the largest kinetic energy; a free fall from the top takes {fall:.0} s"
+        );
+        for (name, value, unit, source, reference, said) in [
+            (
+                "stood",
+                f64::from(u8::from(stood)),
+                "1",
+                "1 if it stood until the crack opened",
+                1.0,
+                "it barely stands",
+            ),
+            (
+                "time_of_impact",
+                since(times.peak[1]),
+                "s",
+                &free,
+                CLIFF_FALL,
+                "about 10 minutes of free fall",
+            ),
+            (
+                "time_of_rest",
+                end,
+                "s",
+                "the same, of rest; null where the run ended before",
+                CLIFF_REST,
+                "an hour at most",
+            ),
+        ] {
+            let quantity = Quantity::new(value, unit);
+            summary.put(name, self.beside_cliffs(quantity, source, reference, said));
+        }
+        let grains = Quantity::new(self.material.smallest_diameter, "m");
+        let source = "of the material; it is to stand barely";
+        let grains = match self.grains_of_the_paper() {
+            Some(smallest) => {
+                let source =
+                    format!("{source}: Kappel et al. 2020, §4.2, at this height and overhang");
+                grains.against(smallest, &source)
+            }
+            None => grains.from(source),
+        };
+        summary.put("smallest_diameter", grains);
         let word = match (stood, failed) {
             (false, _) => format!(
                 "The cliff does not stand by itself: it fails {:.0} s after its support is taken away, before the crack opens.",
@@ -157,7 +194,8 @@ impl CliffScene {
             "forward_turn",
             turned,
             "degrees",
-            "of the sintered part before the crack, forward positive",
+            "of the sintered part before the crack, forward positive; a crack steeper than the overhang tips a face forward, one \
+             less steep backward (Kappel et al. 2020, §4.2)",
         );
         put(
             "solid_fraction",
@@ -193,6 +231,34 @@ impl CliffScene {
             let survive = Quantity::new(survive, "1");
             summary.put("bond_survival", self.reference(4, survive, source));
         }
+    }
+
+    /// What the paper says of its cliffs of 30 m, where the scene is one.
+    fn beside_cliffs(
+        &self,
+        quantity: Quantity,
+        source: &str,
+        reference: f64,
+        said: &str,
+    ) -> Quantity {
+        if self.shape.height == CLIFF_HEIGHT {
+            quantity.against(reference, &format!("{source}; {CLIFF_SOURCE}: {said}"))
+        } else {
+            quantity.from(source)
+        }
+    }
+
+    /// Smallest grains (m) of those of which the paper's cliff of this height and overhang barely stands.
+    fn grains_of_the_paper(&self) -> Option<f64> {
+        if self.shape.height == ASWAN_HEIGHT {
+            return Some(ASWAN_GRAINS);
+        }
+        let is_one = self.shape.height == CLIFF_HEIGHT;
+        let overhang = self.shape.overhang_degrees;
+        let found = CLIFF_GRAINS
+            .iter()
+            .find(|[degrees, _]| *degrees == overhang);
+        found.filter(|_| is_one).map(|[_, smallest]| *smallest)
     }
 
     /// Reference of the Aswan cliff, where the scene is one.

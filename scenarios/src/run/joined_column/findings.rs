@@ -10,6 +10,7 @@ use crate::scene::{ColumnFloorKind, DENSE, overlap_words};
 use crate::state_hash;
 use crate::summary::{Figure, Quantity, Summary};
 use crate::table::Table;
+use colluvium_coupling::overlap::bowl::Reason;
 use colluvium_coupling::overlap::material_edge::{MaterialEdge, Move};
 
 /// Limits of the monitors: slip over √(g H), ratio of forces less 1, share of the relaxation.
@@ -465,26 +466,35 @@ fn sides(
 /// Moves of the edge with their reasons, in a table and in words.
 fn moves(place: f64, edge: &MaterialEdge, summary: &mut Summary) -> Option<Table> {
     let all = edge.moves();
-    let inwards = all.iter().filter(|m| m.mass > 0.0);
+    let inwards = all.iter().filter(|m| m.mass > 0.0).count();
     let sum = |sign: f64| {
         let of = all.iter().map(|m| m.mass * sign);
         of.filter(|m| *m > 0.0).sum::<f64>()
     };
     summary.remarks.push(format!(
-        "The edge moved {} times, {} of them inwards: {:.3} kg became continuum and {:.3} kg grains again; {} moves inwards were refused by \
+        "The edge moved {} times ({} by {}, {} by {}): {:.3} kg became continuum and {:.3} kg grains again; {} moves inwards were refused by \
          zones.budget, and {} grains were laid on top because their place was taken.",
         all.len(),
-        inwards.count(),
+        inwards,
+        Reason::Speed.word(),
+        all.len() - inwards,
+        Reason::Rest.word(),
         sum(-1.0),
         sum(1.0),
         edge.refused_moves(),
         edge.displaced()
     ));
+    let reason = |m: &Move| match m.mass > 0.0 {
+        true => Reason::Speed,
+        false => Reason::Rest,
+    };
     let column = |f: fn(&Move) -> f64| all.iter().map(f).collect::<Vec<f64>>();
+    let reasons = all.iter().map(|m| reason(m).number() as f64).collect();
     let places = all.iter().map(|m| place + m.edge).collect();
     let table = Table::new("moves")
         .with("t", "s", column(|m| m.time))
         .with("edge", "m", places)
+        .with("reason", "1", reasons)
         .with("speed", "m/s", column(|m| m.speed))
         .with("mass", "kg", column(|m| m.mass))
         .with("grains", "1", column(|m| m.grains));
