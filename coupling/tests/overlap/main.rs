@@ -4,6 +4,7 @@
 
 #![allow(clippy::unwrap_used)]
 
+mod angular;
 mod books;
 mod comparison;
 mod growth;
