@@ -14,6 +14,7 @@ mod joined;
 mod loose;
 mod material;
 mod motion;
+mod patch_noise;
 mod pulse;
 mod rest;
 mod rest_pressure;
