@@ -2,6 +2,7 @@
 //!
 //! Units: mean diameter, mean mass and gravity are 1; times are √(d/g).
 
+mod angular;
 mod books;
 mod comparison;
 mod growth;
@@ -11,6 +12,7 @@ mod joined;
 mod loose;
 mod material;
 mod motion;
+mod patch_noise;
 mod pulse;
 mod rest;
 mod rest_pressure;
