@@ -1,8 +1,8 @@
 //! Angular momentum of the grains closes to round-off with what every load gives, and does not where one is left out.
 
-use crate::growth::{self, Bed};
-use crate::material::{Joined, TRAVEL};
-use crate::world::{DENSITY, law, rheology, scales};
+use super::growth::{self, Bed};
+use super::material::{Joined, TRAVEL};
+use super::world::{DENSITY, law, rheology, scales};
 use colluvium_continuum::grid::Boundary;
 use colluvium_coupling::overlap::material_edge::Travel;
 use colluvium_coupling::overlap::{AngularBook, FlatEdge, Overlap, OverlapSettings, OverlapSpec};

@@ -6,7 +6,7 @@
 //! beyond it but for the motion of all above, so that noise stays until that motion is averaged over, and then falls faster
 //! than by 1/√t.
 
-use crate::world::{Bed, STEP, deep_bed, small_bed, steps};
+use super::world::{Bed, STEP, deep_bed, small_bed, steps};
 use colluvium_coupling::overlap::{Overlap, OverlapSettings};
 use colluvium_dem::{Partner, Simulation, Snapshot};
 
