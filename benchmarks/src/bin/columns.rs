@@ -97,7 +97,7 @@ const WATCHED: f64 = 5.0;
 /// Cells up to this x/L and z/H are the core, which does not flow at any time
 const CORE: f64 = 0.25;
 /// in columns of a smaller aspect ratio than this.
-const ALL_FLOWS: f64 = 2.0;
+const ALL_FLOWS: f64 = 1.0;
 
 /// Heights of a heap at even places.
 #[derive(Default)]
@@ -354,18 +354,18 @@ fn print_creep(case: &CollapseCase, floor: f64, mut run: Run) -> Outcome<()> {
         println!("| no rest | – | – |");
         return Ok(());
     };
-    for (t, profile, _) in run
-        .profiles
-        .iter()
-        .filter(|(t, ..)| t.fract() == 0.0 && *t > 0.0)
-    {
-        let fall = case.height - profile.h[0];
-        println!(
-            "| fall of h(0) until t = {t}, H | {fall:.2e} | {:.2} |",
-            fall / (floor * t)
-        );
-    }
     if case.aspect < ALL_FLOWS {
+        for (t, profile, _) in run
+            .profiles
+            .iter()
+            .filter(|(t, ..)| t.fract() == 0.0 && *t > 0.0)
+        {
+            let fall = case.height - profile.h[0];
+            println!(
+                "| fall of h(0) until t = {t}, H | {fall:.2e} | {:.2} |",
+                fall / (floor * t)
+            );
+        }
         let speed = run.largest_core_speed;
         println!(
             "| largest speed at x < L/4, z < H/4 until rest, √(gH) | {speed:.2e} | {:.2} |",

@@ -42,8 +42,6 @@ const PEER_CHUTE: [(usize, f64, f64); 3] =
 /// sharp and a filtered interface, 3000 steps.
 const PEER_SURFACE: [(usize, f64, f64); 3] =
     [(16, 1.54e-2, 0.9), (32, 6.22e-3, 3.0), (64, 3.75e-3, 11.5)];
-/// Grids that the peer has no figures of.
-const FINEST: [usize; 1] = [128];
 /// Processor time (s) for which a case is repeated.
 const SAMPLE: f64 = 0.3;
 
@@ -128,11 +126,12 @@ const ENDLESS: f64 = 1e8;
 /// (time, error) of one curve.
 type Curve = Vec<(f64, f64)>;
 
-/// Rows of one case; gives the curves of the peer, of ours along one axis and on N × N cells.
+/// Rows of one case, on the peer's grids and finer ones; gives the curves of the peer, of ours along one axis and on N × N cells.
 fn compare(
     page: &mut String,
     name: &str,
     peer: &[(usize, f64, f64)],
+    finer: &[usize],
     solve: impl Fn(usize, Option<usize>) -> Result<f64, colluvium_continuum::Error>,
 ) -> Outcome<[Curve; 3]> {
     writeln!(
@@ -142,10 +141,7 @@ fn compare(
     let mut curves: [Curve; 3] = Default::default();
     let mut before: Option<f64> = None;
     let known = peer.iter().map(|row| (row.0, Some((row.1, row.2))));
-    let finer = FINEST
-        .iter()
-        .filter(|cells| peer.iter().all(|row| row.0 < **cells));
-    for (cells, theirs) in known.chain(finer.map(|cells| (*cells, None))) {
+    for (cells, theirs) in known.chain(finer.iter().map(|cells| (*cells, None))) {
         let (error, flat_time) = timed(|| solve(cells, None))?;
         let (_, square_time) = timed(|| solve(cells, Some(cells)))?;
         let order = before.map_or("–".into(), |b| format!("{:.2}", (b / error).log2()));
@@ -382,6 +378,7 @@ fn main() -> Outcome<()> {
         &mut page,
         "Bagnold flow",
         &PEER_BAGNOLD,
+        &[],
         |cells, columns| {
             BagnoldCase {
                 columns,
@@ -395,12 +392,14 @@ fn main() -> Outcome<()> {
         &mut page,
         "Bagnold flow, its surface inside a cell",
         &PEER_SURFACE,
+        &[128],
         under_a_surface,
     )?;
     let chutes = compare(
         &mut page,
         "Half chute with a plug",
         &PEER_CHUTE,
+        &[],
         |cells, columns| {
             chute(cells, columns)
                 .solve(&options, &mut without_progress)
