@@ -47,7 +47,9 @@ pub(super) fn collapse(body: &CollapseScene, ground: Option<&CollapseGround>) ->
         );
     }
     let mut cells = format!("{} square cells of {spacing:.4e} m along x", case.cells);
+    let mut courant = body.solver.courant;
     if let Some(case) = run::channel::case(body) {
+        courant = run::channel::options(body).courant;
         let words = run::collapse_ground::words_of;
         lines.say(
             "side walls",
@@ -80,12 +82,12 @@ pub(super) fn collapse(body: &CollapseScene, ground: Option<&CollapseGround>) ->
     }
     let largest = body.solver.largest_step_scaled * units.time();
     // Fronts move at about √(g H) and at most twice that.
-    let step = (body.solver.courant * spacing / units.velocity).min(largest);
+    let step = (courant * spacing / units.velocity).min(largest);
     lines.say(
         "time step",
         &format!(
-            "about {step:.4e} s while the front moves at √(g H) = {:.3} m/s (courant {}), {largest:.4e} s at rest",
-            units.velocity, body.solver.courant
+            "about {step:.4e} s while the front moves at √(g H) = {:.3} m/s (courant {courant}), {largest:.4e} s at rest",
+            units.velocity
         ),
     );
     let steps = body.duration_scaled * units.time() / step;

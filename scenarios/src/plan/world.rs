@@ -126,7 +126,8 @@ fn say_world(lines: &mut Lines, stand: &Stand) {
         lines.say("clumps", &text);
     }
     say_box(lines, stand);
-    let g = world.gravity;
+    // A component that is zero has no sign.
+    let g = world.gravity.map(|component| component + 0.0);
     let mut pulls = vec![format!("({:.4e}, {:.4e}, {:.4e}) m/s²", g.x, g.y, g.z)];
     if world.schedule.is_some() {
         pulls.push("changing in time".into());

@@ -12,7 +12,7 @@ use crate::table::Table;
 use crate::vtkhdf::Frame;
 use colluvium_continuum::Error;
 use colluvium_continuum::channel_collapse::{ChannelCase, ChannelCollapse};
-use colluvium_continuum::free_surface::{SpaceState, SurfaceStep};
+use colluvium_continuum::free_surface::{SpaceState, SurfaceOptions, SurfaceStep};
 use colluvium_continuum::strain::SPACE_COMPONENTS;
 use colluvium_continuum::units::Units;
 
@@ -99,6 +99,13 @@ impl Followed<3, SPACE_COMPONENTS> for Falling<'_> {
 /// Larger ones were measured in the plane only.
 const LARGEST_COURANT: f64 = 0.45;
 
+/// The solver's settings in space.
+pub fn options(scene: &CollapseScene) -> SurfaceOptions {
+    let mut options = options_of(&scene.solver);
+    options.courant = options.courant.min(LARGEST_COURANT);
+    options
+}
+
 pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, Failure> {
     let refused = |error: Error| Failure::Input(format!("{}: {error}", under.scene.origin));
     let Some(case) = case(scene) else {
@@ -107,9 +114,7 @@ pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, 
             under.scene.origin
         )));
     };
-    let mut options = options_of(&scene.solver);
-    options.courant = options.courant.min(LARGEST_COURANT);
-    let collapse = ChannelCollapse::new(&case, &options).map_err(refused)?;
+    let collapse = ChannelCollapse::new(&case, &options(scene)).map_err(refused)?;
     let end = scene.duration_scaled * collapse.units().time();
     let mut falling = Falling { collapse, scene };
     let course = surface_run::follow(&mut falling, end, under)?;
