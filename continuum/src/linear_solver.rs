@@ -21,12 +21,13 @@
 
 mod dissection;
 mod gmres;
+mod lanes;
 mod ldlt;
 mod lu;
 mod multigrid;
+mod panels;
 mod pattern;
 mod product;
-mod substitution;
 
 use std::time::Instant;
 
