@@ -21,12 +21,15 @@
 
 mod dissection;
 mod gmres;
+mod lanes;
 mod ldlt;
 mod lu;
 mod multigrid;
+mod panels;
 mod pattern;
 mod product;
-mod substitution;
+
+use std::time::Instant;
 
 use faer::sparse::SymbolicSparseColMat;
 
@@ -83,6 +86,8 @@ pub struct SparseSystem {
     state: Factors,
     /// Whether the factors are of earlier coefficients.
     is_kept: bool,
+    /// Wall time spent on factors since it was asked for last (s).
+    factor_time: f64,
 }
 
 /// The iteration and its preconditioners.
@@ -157,6 +162,7 @@ impl SparseSystem {
             direct: None,
             state: Factors::None,
             is_kept: false,
+            factor_time: 0.0,
         };
         let (krylov, with_multigrid) = match method {
             Method::Direct => {
@@ -233,6 +239,7 @@ impl SparseSystem {
     /// The factors that precondition, or those of the whole matrix if there are none.
     fn factorise_symmetric_part(&mut self) -> Result<(), Error> {
         self.is_kept = false;
+        let clock = Instant::now();
         if let Some(iterative) = &mut self.iterative
             && let Ok(factors) = iterative.analyse(&self.pattern)
             && factors
@@ -240,19 +247,28 @@ impl SparseSystem {
                 .is_ok()
         {
             self.state = Factors::Symmetric;
+            self.factor_time += clock.elapsed().as_secs_f64();
             return Ok(());
         }
+        self.factor_time += clock.elapsed().as_secs_f64();
         self.factorise_directly()
     }
 
     fn factorise_directly(&mut self) -> Result<(), Error> {
+        let clock = Instant::now();
         let lu = match &mut self.direct {
             Some(lu) => lu,
             empty => empty.insert(Lu::new(self.pattern.as_ref())?),
         };
         lu.factorise(self.pattern.as_ref(), &self.values)?;
         self.state = Factors::Full;
+        self.factor_time += clock.elapsed().as_secs_f64();
         Ok(())
+    }
+
+    /// Wall time spent on factors since the last call (s).
+    pub fn take_factor_time(&mut self) -> f64 {
+        std::mem::take(&mut self.factor_time)
     }
 
     /// GMRES with the present preconditioner; says whether it came to its end.

@@ -23,7 +23,7 @@ mod regularised;
 
 #[cfg(feature = "conic")]
 pub use conic::{ConicOptions, ConicProgram, PressureOf};
-pub use primal_dual::{LinearSolver, PrimalDual, PrimalDualOptions};
+pub use primal_dual::{LinearSolver, PrimalDual, PrimalDualOptions, SolverTimes};
 pub use regularised::{RegularisedOptions, RegularisedViscosity};
 
 use serde::Serialize;

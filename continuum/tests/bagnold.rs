@@ -4,8 +4,6 @@
 //! of the Basilisk test case; Basilisk C 25-02-26 on a fixed flat surface has relative L2 errors
 //! 7.22e-3, 1.97e-3, 5.21e-4, 1.39e-4 at 16, 32, 64, 128 cells (own measurement).
 // A helper of a test may panic like the test itself.
-#![allow(clippy::unwrap_used)]
-
 use std::ops::ControlFlow;
 
 use colluvium_continuum::Error;

@@ -5,8 +5,6 @@
 //! at a = 0.5 on 128, 256 and 512 cells along x, with a film of air under the front that carries it;
 //! without the air it would be 0.97 to 1.07.
 // A helper of a test may panic like the test itself.
-#![allow(clippy::unwrap_used)]
-
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
 use colluvium_continuum::free_surface::{SurfaceOptions, ThinLayer};
 use colluvium_continuum::rheology::MuI;

@@ -6,8 +6,6 @@
 //! solution; p = 1 + 0.3 sin(kx + 1) cos(2z). The inertial number runs from 0.08 to 0.3, inside the
 //! well-posed window.
 // A helper of a test may panic like the test itself.
-#![allow(clippy::unwrap_used)]
-
 use std::f64::consts::TAU;
 
 use colluvium_continuum::discretisation::{Discretisation, ThresholdPressure};

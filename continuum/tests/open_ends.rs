@@ -1,7 +1,5 @@
 //! Flow that enters at one end and leaves at the other.
 // A helper of a test may panic like the test itself.
-#![allow(clippy::unwrap_used)]
-
 use colluvium_continuum::free_surface::{Inflow, SurfaceFlow, SurfaceOptions, SurfaceState};
 use colluvium_continuum::grid::{Axis, Boundary, Grid};
 use colluvium_continuum::rheology::MuI;

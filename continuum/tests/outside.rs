@@ -1,7 +1,5 @@
 //! A column whose face is not free: other matter leans on it.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
 use colluvium_continuum::Error;
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
 use colluvium_continuum::free_surface::{Outside, SpaceFlow, SurfaceOptions};

@@ -1,7 +1,5 @@
 //! Plane shear and the vertical chute against their exact solutions.
 // A helper of a test may panic like the test itself.
-#![allow(clippy::unwrap_used)]
-
 use std::ops::ControlFlow;
 
 use colluvium_continuum::flow::YieldMethod;

@@ -1,7 +1,5 @@
 //! Grains that fall on a bed that is a continuum.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase, CollapseGround, Matter};
 use colluvium_continuum::free_surface::{Contact, SurfaceOptions};
 use colluvium_continuum::rheology::MuI;

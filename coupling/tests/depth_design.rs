@@ -1,6 +1,4 @@
 //! Slopes and depths of flows chosen together: against even choices at equal cost, by what fits to made-up flows find.
-#![allow(clippy::unwrap_used)]
-
 use colluvium_coupling::calibration::{LocalPoint, Stress, fit_mu_i, mu_of_i};
 use colluvium_coupling::campaign::{
     Depths, Flow, GuessedLaw, Precision, Prospect, choose_flows, choose_slopes, cost, prospect,

@@ -1,7 +1,5 @@
 //! Non-local fluidity as a candidate of the fit, on made-up profiles whose length is known.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
 use colluvium_coupling::calibration::{FluidityFit, FluidityFlow, FluidityLayer, fit_fluidity};
 use nalgebra::{DMatrix, DVector};
 use rand::{RngExt, SeedableRng};

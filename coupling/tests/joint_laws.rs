@@ -1,6 +1,4 @@
 //! Friction and solid fraction as one law: of made-up layers the criterion finds which of the candidates made them.
-#![allow(clippy::unwrap_used)]
-
 use colluvium_coupling::calibration::{
     Fraction, JointComparison, LocalPoint, Stress, compare_joint_laws, mu_of_i,
 };

@@ -1,7 +1,5 @@
 //! The same bits for any number of threads, after a checkpoint, and for any numbering of grains.
 
-#![allow(clippy::unwrap_used)]
-
 use colluvium_dem::preparation::{Bed, InclineBed, RadiusLaw, settle_incline_bed};
 use colluvium_dem::*;
 use nalgebra::Vector3;

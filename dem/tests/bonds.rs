@@ -1,12 +1,8 @@
 //! Bonds in a simulation: oscillations in closed form, breaking, accounts, clusters, restarts.
 
-#![allow(clippy::unwrap_used)]
-
-mod world;
-
+use crate::world::{MATERIAL, laws, setup};
 use colluvium_dem::*;
 use nalgebra::Vector3;
-use world::{MATERIAL, laws, setup};
 
 const RADIUS: f64 = 0.05;
 const GAP: f64 = 1e-4;

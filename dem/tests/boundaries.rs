@@ -1,14 +1,10 @@
 //! Boundaries that move, and boundaries that let grains go.
 
-#![allow(clippy::unwrap_used)]
-
-mod world;
-
+use crate::world::laws;
 use colluvium_dem::*;
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
-use world::laws;
 
 const RADIUS: f64 = 0.05;
 const STEP: f64 = 5e-5;

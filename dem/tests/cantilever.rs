@@ -13,13 +13,9 @@
 //! grains' own moment of inertia and shear, which the theory (Euler–Bernoulli) has not: both lower ω by
 //! a share that falls with 1/N² as well.
 
-#![allow(clippy::unwrap_used)]
-
-mod world;
-
+use crate::world::laws;
 use colluvium_dem::*;
 use nalgebra::Vector3;
-use world::laws;
 
 const RADIUS: f64 = 0.05;
 const SPACING: f64 = 2.0 * RADIUS * 1.001;

@@ -1,7 +1,5 @@
 //! Grains that become another material during a run.
 
-#![allow(clippy::unwrap_used)]
-
 use colluvium_dem::*;
 use nalgebra::Vector3;
 

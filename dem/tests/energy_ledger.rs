@@ -1,11 +1,7 @@
 //! The energy ledger: closed to round-off, and no channel creates energy.
 
-#![allow(clippy::unwrap_used)]
-
-mod world;
-
+use crate::world::{MATERIAL, laws, setup};
 use colluvium_dem::*;
-use world::{MATERIAL, laws, setup};
 
 const GRAINS: usize = 240;
 

@@ -1,15 +1,11 @@
 //! Gravity that changes with time and place: orbits, accounts, restarts.
 
-#![allow(clippy::unwrap_used)]
-
-mod world;
-
+use crate::world::laws;
 use colluvium_dem::*;
 use nalgebra::{Rotation3, Vector3};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::f64::consts::TAU;
-use world::laws;
 
 fn space(grains: Vec<Grain>, timestep: f64, threads: Threads) -> Setup {
     Setup {

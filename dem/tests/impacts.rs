@@ -1,7 +1,5 @@
 //! Impacts of pairs and on walls: restitution, contact time, energy, momentum.
 
-#![allow(clippy::unwrap_used)]
-
 use colluvium_dem::*;
 use nalgebra::Vector3;
 

@@ -1,11 +1,7 @@
 //! Under every law: the same bits for any number of threads and after a checkpoint.
 
-#![allow(clippy::unwrap_used)]
-
-mod world;
-
+use crate::world::{laws, setup};
 use colluvium_dem::*;
-use world::{laws, setup};
 
 const GRAINS: usize = 4000;
 const TIMESTEP: f64 = 1e-4;

@@ -1,12 +1,8 @@
 //! Steady loads: motion in closed form, accounts, restarts and threads.
 
-#![allow(clippy::unwrap_used)]
-
-mod world;
-
+use crate::world::{laws, setup};
 use colluvium_dem::*;
 use nalgebra::Vector3;
-use world::{laws, setup};
 
 const STEP: f64 = 1e-3;
 

@@ -1,9 +1,5 @@
 //! Records that no simulation has written: refused with the name of an array, or taken; no panic.
 
-#![allow(clippy::unwrap_used)]
-
-mod world;
-
 use colluvium_dem::*;
 use nalgebra::Vector3;
 
@@ -60,8 +56,8 @@ const MISCOUNTS: [fn(&mut Vec<u64>); 8] = [
 
 #[test]
 fn spoilt_arrays_are_refused_by_name_or_taken() {
-    let (name, law) = world::laws().swap_remove(4);
-    let mut setup = world::setup(law, 200, 1e-4);
+    let (name, law) = crate::world::laws().swap_remove(4);
+    let mut setup = crate::world::setup(law, 200, 1e-4);
     // Self-gravity has no images.
     setup.domain.periodic = [false; 3];
     let sound = record(&setup);

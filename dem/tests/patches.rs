@@ -1,12 +1,8 @@
 //! Grains taken out of a run and put back: they go on as if they had never been away.
 
-#![allow(clippy::unwrap_used)]
-
-mod world;
-
+use crate::world::{laws, setup};
 use colluvium_dem::*;
 use std::collections::BTreeMap;
-use world::{laws, setup};
 
 const STEP: f64 = 5e-5;
 

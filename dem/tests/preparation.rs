@@ -1,6 +1,4 @@
 //! Preparations against known packings, and against what they promise.
-#![allow(clippy::unwrap_used)]
-
 use colluvium_dem::preparation::*;
 use colluvium_dem::*;
 use nalgebra::{UnitQuaternion, Vector3};

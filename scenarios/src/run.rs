@@ -31,6 +31,7 @@ pub mod joined_incline;
 mod land;
 mod march_record;
 pub mod open_chute;
+mod overlap_state;
 pub mod precheck;
 pub mod settle;
 mod silo;

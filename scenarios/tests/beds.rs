@@ -1,10 +1,6 @@
 //! The scenes of a bed, `chute` and `settle`, and the contact laws by name.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use command::{colluvium, hash, succeed, summary, table, value};
+use crate::command::{colluvium, hash, succeed, summary, table, value};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};

@@ -1,10 +1,6 @@
 //! Rigid bodies in scenes of one's own: a lander on a bed, a pendulum, a paddle, what is refused.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use command::{colluvium, hash, succeed, summary, table, value};
+use crate::command::{colluvium, hash, pause, succeed, summary, table, value};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -131,7 +127,9 @@ fn a_lander_falls_on_a_bed_with_accounts_closed_and_resumes_to_the_bit() {
         .stdout(Stdio::null())
         .spawn()
         .unwrap();
-    while !at("two/checkpoint.h5").exists() && child.try_wait().unwrap().is_none() {}
+    while !at("two/checkpoint.h5").exists() && child.try_wait().unwrap().is_none() {
+        pause();
+    }
     child.kill().unwrap();
     child.wait().unwrap();
     two.push("--resume");
@@ -201,7 +199,9 @@ parts = [{ shape = "frustum", radii = [0.1, 0.0], length = 0.2, axis = [1.0, 0.0
         .stdout(Stdio::null())
         .spawn()
         .unwrap();
-    while !at("b/checkpoint.h5").exists() && child.try_wait().unwrap().is_none() {}
+    while !at("b/checkpoint.h5").exists() && child.try_wait().unwrap().is_none() {
+        pause();
+    }
     child.kill().unwrap();
     child.wait().unwrap();
     stopped.push("--resume");

@@ -1,10 +1,8 @@
 //! Cliffs in small.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use command::{INSTALMENTS, SMALL_COMET_CLIFF, colluvium, hash, succeed, summary, table, value};
+use crate::command::{
+    INSTALMENTS, SMALL_COMET_CLIFF, colluvium, hash, succeed, summary, table, value,
+};
 
 fn run<'a>(out: &'a str, sets: &[&'a str]) -> Vec<&'a str> {
     let mut list = vec!["run", "cliff", "--out", out];

@@ -1,10 +1,6 @@
 //! Cliffs before which the ground is no plane.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use command::{SMALL_COMET_CLIFF, colluvium, hash, succeed, summary, table, value};
+use crate::command::{SMALL_COMET_CLIFF, colluvium, hash, succeed, summary, table, value};
 use std::path::Path;
 
 fn run<'a>(out: &'a str, sets: &[&'a str]) -> Vec<&'a str> {

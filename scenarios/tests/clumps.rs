@@ -1,10 +1,6 @@
 //! Clumps of grains in scenes of one's own: a heap of them, restarts, what is refused.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use command::{colluvium, hash, succeed, summary, table, value};
+use crate::command::{colluvium, hash, pause, succeed, summary, table, value};
 use std::process::{Command, Stdio};
 
 /// Jacks of four balls that fall on a floor within a tube, on a few grains.
@@ -92,7 +88,9 @@ fn clumps_settle_with_accounts_closed_and_resume_to_the_bit() {
         .stdout(Stdio::null())
         .spawn()
         .unwrap();
-    while !at("two/checkpoint.h5").exists() && child.try_wait().unwrap().is_none() {}
+    while !at("two/checkpoint.h5").exists() && child.try_wait().unwrap().is_none() {
+        pause();
+    }
     child.kill().unwrap();
     child.wait().unwrap();
     two.push("--resume");

@@ -1,10 +1,6 @@
 //! Columns of grains that run out over terrain, with a continuum beside them or behind.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use command::{SMALL_JOINED_COLUMN, colluvium, succeed, summary, table, value};
+use crate::command::{SMALL_JOINED_COLUMN, colluvium, succeed, summary, table, value};
 
 fn arguments<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
     let mut list = vec!["run", "column-collapse", "--threads", "1", "--out", out];

@@ -1,10 +1,6 @@
 //! Scenes of cometary material in small: the tensile test and the boulder drop.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use command::{colluvium, succeed, summary, table, value};
+use crate::command::{colluvium, succeed, summary, table, value};
 use serde_json::Value;
 use std::path::Path;
 

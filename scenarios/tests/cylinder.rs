@@ -1,14 +1,10 @@
 //! The collapse of a cylinder in space, from the command line.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use colluvium::vtkhdf;
-use command::{
+use crate::command::{
     colluvium, shares_say_what_the_summary_says, steps_say_what_the_summary_says, succeed, summary,
     table, value,
 };
+use colluvium::vtkhdf;
 
 #[test]
 fn cylinder_writes_front_deposit_and_fields() {

@@ -1,10 +1,6 @@
 //! A cylinder of grains and the continuum of their calibrated law beside it.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use command::{colluvium, hash, succeed, summary, table, value};
+use crate::command::{colluvium, hash, succeed, summary, table, value};
 
 fn run<'a>(out: &'a str, sets: &[&'a str]) -> Vec<&'a str> {
     let mut list = vec!["run", "cylinder-of-grains", "--out", out];

@@ -1,10 +1,6 @@
 //! Places that cannot be written: a clear message, and the last good state is left.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use command::{colluvium, hash, succeed, summary};
+use crate::command::{colluvium, hash, pause, succeed, summary};
 use std::path::Path;
 use std::process::{Command, Output};
 
@@ -73,7 +69,9 @@ fn a_disk_that_fills_up_ends_the_run_and_leaves_the_last_good_state() {
         .stdout(std::process::Stdio::null())
         .spawn()
         .unwrap();
-    while !at("a").join("checkpoint.h5").exists() && child.try_wait().unwrap().is_none() {}
+    while !at("a").join("checkpoint.h5").exists() && child.try_wait().unwrap().is_none() {
+        pause();
+    }
     child.kill().unwrap();
     child.wait().unwrap();
     let saved = std::fs::read(at("a").join("checkpoint.h5")).unwrap();
@@ -119,7 +117,9 @@ fn a_folder_that_goes_away_during_a_run_is_said() {
         .stderr(std::process::Stdio::piped())
         .spawn()
         .unwrap();
-    while !a.join("log.txt").exists() {}
+    while !a.join("log.txt").exists() {
+        pause();
+    }
     // Another name is as good as none: nothing writes there any more.
     std::fs::rename(&a, folder.path().join("b")).unwrap();
     let done = child.wait_with_output().unwrap();

@@ -1,10 +1,6 @@
 //! Scenes with sections of one's own: checkpoints, stored packings, what is refused.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use command::{colluvium, succeed, summary, value};
+use crate::command::{colluvium, succeed, summary, value};
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Stdio};

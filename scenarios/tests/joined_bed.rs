@@ -1,10 +1,6 @@
 //! A ball that falls into grains with a continuum around them, from the command line.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use command::{colluvium, hash, succeed, summary, table, value};
+use crate::command::{colluvium, hash, pause, succeed, summary, table, value};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -185,7 +181,9 @@ fn a_joined_bed_goes_on_after_a_kill() {
             .stdout(Stdio::null())
             .spawn()
             .unwrap();
-        while !checkpoint.exists() && child.try_wait().unwrap().is_none() {}
+        while !checkpoint.exists() && child.try_wait().unwrap().is_none() {
+            pause();
+        }
         std::thread::sleep(std::time::Duration::from_millis(200));
         child.kill().unwrap();
         child.wait().unwrap();

@@ -1,10 +1,6 @@
 //! A dry cliff that leans out, grains in front and a continuum behind, from the command line.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use command::{succeed, summary, table, value};
+use crate::command::{succeed, summary, table, value};
 use std::path::Path;
 
 /// A cliff of blocks of a tenth of its height, longer than it is high.

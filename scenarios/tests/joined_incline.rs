@@ -1,10 +1,6 @@
 //! The scene `incline` as grains, continuum and both: the same start and time, tables, monitors, threads and restarts.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use command::{SMALL_HYBRID, hash, succeed, summary, table, value};
+use crate::command::{SMALL_HYBRID, hash, succeed, summary, table, value};
 use std::path::Path;
 
 fn run(folder: &Path, out: &str, more: &[&str]) {

@@ -1,12 +1,8 @@
 //! Runs that are killed or stopped at any moment go on to the same state.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use command::{
+use crate::command::{
     INSTALMENTS, MOVING_EDGE, SMALL_COMET_CLIFF, SMALL_HYBRID, SMALL_JOINED_COLUMN, colluvium,
-    hash, succeed, table,
+    hash, pause, succeed, table,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -36,6 +32,7 @@ fn kill(folder: &Path, arguments: &[&str], mut now: impl FnMut() -> bool) -> boo
             assert!(status.success(), "{arguments:?} failed by itself");
             return false;
         }
+        pause();
     }
     child.kill().unwrap();
     child.wait().unwrap().code().is_none()

@@ -1,14 +1,10 @@
 //! Broken scenes, start files, rheologies and run directories: no panic, status 2, a message that names
 //! file and key, nothing written.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
+use crate::command::{colluvium, succeed};
 use colluvium::failure::{BAD_INPUT, Failure};
 use colluvium::scene::{self, Scene};
 use colluvium::{run, start_file};
-use command::{colluvium, succeed};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
 use std::fs;

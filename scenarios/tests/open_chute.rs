@@ -1,14 +1,10 @@
 //! A chute that is fed and open, from the command line.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use colluvium::vtkhdf;
-use command::{
+use crate::command::{
     colluvium, shares_say_what_the_summary_says, steps_say_what_the_summary_says, succeed, summary,
     table, value,
 };
+use colluvium::vtkhdf;
 
 /// Half the cells and a short chute.
 const SMALL: [&str; 4] = ["--set", "scale=0.5", "--set", "grid.length_scaled=2.5"];

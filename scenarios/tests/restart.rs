@@ -1,11 +1,7 @@
 //! The same bits for any number of threads, and after an interruption.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
+use crate::command::{colluvium, hash, succeed, summary};
 use colluvium::checkpoint::Checkpoints;
-use command::{colluvium, hash, succeed, summary};
 use std::path::Path;
 use std::process::{Command, Stdio};
 use std::time::{Duration, Instant};

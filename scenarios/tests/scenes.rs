@@ -1,11 +1,7 @@
 //! Scenes from the command line to their results.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
+use crate::command::{colluvium, succeed, summary, table, value};
 use colluvium::scene::BUNDLED;
-use command::{colluvium, succeed, summary, table, value};
 use std::f64::consts::PI;
 
 #[test]

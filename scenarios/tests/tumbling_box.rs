@@ -1,10 +1,6 @@
 //! A lander on a bed: accounts, restarts, what is refused.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use command::{colluvium, succeed, summary, value};
+use crate::command::{colluvium, succeed, summary, value};
 
 /// A thin bed, met early, under a stronger pull: a short run.
 const SHORT: [&str; 12] = [

@@ -1,10 +1,6 @@
 //! The ball, the silos and the slope: what is exact in them, and what must fail.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-mod command;
-
-use command::{colluvium, hash, succeed, summary, table, value};
+use crate::command::{colluvium, hash, pause, succeed, summary, table, value};
 use std::path::Path;
 use std::process::{Command, Stdio};
 
@@ -62,7 +58,9 @@ fn a_ball_falls_freely_and_stops_in_the_bed() {
         .stdout(Stdio::null())
         .spawn()
         .unwrap();
-    while !at("two/checkpoint.h5").exists() && child.try_wait().unwrap().is_none() {}
+    while !at("two/checkpoint.h5").exists() && child.try_wait().unwrap().is_none() {
+        pause();
+    }
     child.kill().unwrap();
     child.wait().unwrap();
     two.push("--resume");

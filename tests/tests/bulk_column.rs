@@ -4,8 +4,6 @@
 //! and friction points up everywhere. Without that the law has no claim: a column that merely settles
 //! keeps the friction of its filling, up in one place and down in another.
 
-#![allow(clippy::unwrap_used)]
-
 use colluvium_dem::Snapshot;
 use colluvium_tests::silo::{Column, Janssen, Loads};
 

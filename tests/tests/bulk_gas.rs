@@ -1,7 +1,5 @@
 //! Bulk laws of granular gases: Haff's cooling and the pressure of kinetic theory.
 
-#![allow(clippy::unwrap_used)]
-
 use colluvium_dem::Snapshot;
 use colluvium_tests::fit::{Line, largest, mean_and_error};
 use colluvium_tests::gas::{Gas, pressure, temperature};

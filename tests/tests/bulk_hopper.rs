@@ -5,8 +5,6 @@
 //! that the rim is rounded. Such rims have a k of their own, smaller than the 1.4 ± 0.1 of sharp ones
 //! (Nedderman 1992): slot and hole must agree on it, and k from the one gives the other's exponent.
 
-#![allow(clippy::unwrap_used)]
-
 use colluvium_tests::fit::Line;
 use colluvium_tests::silo::{Hopper, Opening};
 

@@ -1,8 +1,6 @@
 //! Angles of repose of the thesis' grains (Thuillet 2019, Tab. 2.2, from avalanches of Y. Zhang), as the scene
 //! `angle-of-repose` finds them: μ_s = 1, μ_T = 1.3; ε is not stated there, 0.5 is that of Tab. 2.1.
 
-#![allow(clippy::unwrap_used)]
-
 use colluvium::report::read_summary;
 use colluvium::run::{self, RunOptions};
 use colluvium::scene::Scene;

@@ -3,8 +3,6 @@
 //!
 //! Half an hour on a quiet core: run by `validate.sh`. The short form is `scenarios/tests/cliff.rs`.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
 use colluvium::report;
 use colluvium::run::{RunOptions, run};
 use colluvium::scene::Scene;

@@ -4,8 +4,6 @@
 //! Staron & Popinet, J. Fluid Mech. 686 (2011) 378, Eq. 3.1. Ten minutes on a quiet core: run by `validate.sh`. The short form
 //! is in `scenarios/tests/collapse.rs`.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
 use colluvium::report;
 use colluvium::run::{RunOptions, run};
 use colluvium::scene::Scene;

@@ -5,8 +5,6 @@
 //! 100 MPa within its error, the step three times as long). Fifteen minutes on a quiet core: run by
 //! `validate.sh`. The short forms are `scenarios/tests/comet.rs`.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
 use colluvium::report;
 use colluvium::run::{RunOptions, run};
 use colluvium::scene::Scene;

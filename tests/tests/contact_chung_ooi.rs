@@ -11,8 +11,6 @@
 //! arm is the undeformed radius here, as in the closed form; that of the contact point is shorter by the
 //! overlap.
 
-#![allow(clippy::unwrap_used)]
-
 use colluvium_dem::contact::mindlin::SpringMemory;
 use colluvium_dem::{ContactLaw, Elasticity, Grain, Hertz, Lever, Normal, Tangential};
 use colluvium_tests::impacts::*;

@@ -1,7 +1,5 @@
 //! Closed forms that LAMMPS' granular unit tests (4 Jul 2026) check, for every law that has them.
 
-#![allow(clippy::unwrap_used)]
-
 use colluvium_dem::contact::Damping;
 use colluvium_dem::contact::hertz::secant_stiffness;
 use colluvium_dem::{

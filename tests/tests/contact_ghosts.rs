@@ -1,7 +1,5 @@
 //! What no contact may do: create energy, care about numbering, treat a wall as another law.
 
-#![allow(clippy::unwrap_used)]
-
 use colluvium_dem::{ContactLaw, Grain, Lever, Normal, Simulation};
 use colluvium_tests::impacts::*;
 use colluvium_tests::laws;

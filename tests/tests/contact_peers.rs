@@ -8,8 +8,6 @@
 //! the same: [`SpringMemory::Displacement`] with the lever arm [`Lever::Radius`] is LAMMPS' `mindlin`,
 //! with [`Lever::ContactPoint`] LIGGGHTS' `history`. In D and E neither is right (see there).
 
-#![allow(clippy::unwrap_used)]
-
 use colluvium_dem::contact::mindlin::SpringMemory;
 use colluvium_dem::{ContactLaw, Elasticity, Hertz, Lever, Tangential};
 use colluvium_tests::impacts::*;

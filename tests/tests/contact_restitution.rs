@@ -7,8 +7,6 @@
 //! | Hertz | e at any speed | by its own equation | Antypov & Elliott 2011 |
 //! | viscoelastic | f(β v^{1/5}) | 5.84 (ρ(1-ν²)/E)^{2/5} r v^{-1/5} | Müller & Pöschel 2011; Tancredi et al. 2012 |
 
-#![allow(clippy::unwrap_used)]
-
 use colluvium_dem::contact::Damping;
 use colluvium_dem::{ContactLaw, Hooke, Lever, Normal, Rolling, Tangential, Viscoelastic};
 use colluvium_tests::impacts::*;

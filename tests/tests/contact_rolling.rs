@@ -12,8 +12,6 @@
 //! seen: with q = R/l, slip ends at v = v_0/(1 + 0.4 q²), and rolling is
 //! `v̇ = g (sin θ - μ_r q cos θ)/(1 + 0.4 q²)`.
 
-#![allow(clippy::unwrap_used)]
-
 use colluvium_dem::{
     ContactLaw, Elasticity, Epsd, Grain, Partner, Rolling, ShapeParameter, Simulation,
 };

@@ -2,8 +2,6 @@
 //!
 //! Balls of 1 m and 3000 kg/m³, Y = 1e10 Pa, A = 1e-3 s (printed 1/s), ν = 0.3, unless said otherwise.
 
-#![allow(clippy::unwrap_used)]
-
 use colluvium_dem::contact::Damping;
 use colluvium_dem::{
     Cohesion, ContactLaw, Grain, Lever, Normal, Rolling, SpringStiffness, Tangential,

@@ -1,7 +1,5 @@
 //! Cases that break codes: each runs at the step the limits choose, with its energy accounted for.
 
-#![allow(clippy::unwrap_used)]
-
 use colluvium_dem::timestep::{Choice, Conditions, Shares};
 use colluvium_dem::*;
 use colluvium_tests::DENSITY;

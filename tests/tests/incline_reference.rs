@@ -1,7 +1,5 @@
 //! The thesis' moderate material on an incline, against another code and against its own weight.
 
-#![allow(clippy::unwrap_used)]
-
 use colluvium_coupling::calibration::LocalPoint;
 use colluvium_coupling::coarse_graining::ProfileRow;
 use colluvium_coupling::incline::{InclineResult, InclineRun, Outcome, Purpose, Start};

@@ -1,7 +1,5 @@
 //! Flows that the calibrated laws have not seen, long enough to be steady, beside what the laws say of them.
 
-#![allow(clippy::unwrap_used)]
-
 use colluvium::rheology_file::RheologyFile;
 use colluvium::run::{RunOptions, run};
 use colluvium::scene::Scene;

@@ -1,7 +1,5 @@
 //! The limits of the time step against steps that do blow up.
 
-#![allow(clippy::unwrap_used)]
-
 use colluvium_tests::blow_up::{Packings, bisect, trials};
 
 #[test]

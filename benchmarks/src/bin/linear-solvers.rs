@@ -9,6 +9,7 @@
 use std::io::Error as IoError;
 use std::process::Command;
 
+use colluvium_benchmarks::peers::machine::memory;
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
 use colluvium_continuum::cylinder_collapse::{CylinderCase, CylinderCollapse};
 use colluvium_continuum::free_surface::{Contact, SurfaceOptions, SurfaceStep};
@@ -132,7 +133,7 @@ fn run(flow: &str, end: f64, tolerance: f64, cells: usize, solver: LinearSolver)
         work.steps,
         work.iterations,
         cpu * 1e6 / work.cell_iterations as f64,
-        peak_megabytes()?,
+        memory("VmHWM").ok_or("no memory on this system")? * 1e-6,
     );
     Ok(())
 }
@@ -147,13 +148,4 @@ fn cpu_seconds() -> Result<f64, IoError> {
     first
         .map(|n| n * 1e-9)
         .ok_or_else(|| IoError::other("no time in /proc/thread-self/schedstat"))
-}
-
-/// Most memory that the process ever held (MB).
-fn peak_megabytes() -> Result<f64, IoError> {
-    let text = std::fs::read_to_string("/proc/self/status")?;
-    let line = text.lines().find_map(|line| line.strip_prefix("VmHWM:"));
-    line.and_then(|line| line.split_whitespace().next()?.parse::<f64>().ok())
-        .map(|kilobytes| kilobytes / 1024.0)
-        .ok_or_else(|| IoError::other("no VmHWM in /proc/self/status"))
 }

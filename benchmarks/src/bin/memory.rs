@@ -5,6 +5,7 @@
 //! running simulation less that before its start state was read, largest value and last, by moving grain.
 //! Prints a Markdown table. Reads `/proc`: Linux only.
 
+use colluvium_benchmarks::peers::machine::{begin_peak_of_memory, memory};
 use colluvium_dem::{
     ContactLaw, Damping, Domain, Hooke, Lever, Setup, Simulation, SpringStiffness,
     TangentialSpring, Threads,
@@ -63,13 +64,8 @@ fn setup(threads: usize) -> Setup {
     }
 }
 
-/// A line of `/proc/self/status` in bytes.
 fn status(key: &str) -> Result<f64, Box<dyn Error>> {
-    let text = std::fs::read_to_string("/proc/self/status")?;
-    let line = text.lines().find_map(|line| line.strip_prefix(key));
-    let word = line.and_then(|line| line.split_whitespace().next());
-    let kilobytes: f64 = word.ok_or("the system does not tell memory")?.parse()?;
-    Ok(kilobytes * 1024.0)
+    Ok(memory(key).ok_or("the system does not tell memory")?)
 }
 
 /// Peak and last resident memory of the steps, bytes by moving grain.
@@ -77,14 +73,14 @@ fn measure(threads: usize) -> Result<[f64; 2], Box<dyn Error>> {
     let pool = rayon::ThreadPoolBuilder::new().num_threads(threads);
     pool.build_global()?;
     rayon::broadcast(|_| ());
-    let before = status("VmRSS:")?;
+    let before = status("VmRSS")?;
     let mut chute = Simulation::new(setup(threads))?;
-    // Begins the peak anew, without what the start state took.
-    std::fs::write("/proc/self/clear_refs", "5")?;
+    // Without what the start state took.
+    begin_peak_of_memory()?;
     chute.advance(STEPS)?;
     let moving = chute.grain_count() as f64;
-    let peak = status("VmHWM:")?;
-    let last = status("VmRSS:")?;
+    let peak = status("VmHWM")?;
+    let last = status("VmRSS")?;
     Ok([peak, last].map(|bytes| (bytes - before) / moving))
 }
 

@@ -55,6 +55,21 @@ pub fn processor_time() -> Option<f64> {
     Some(sum * 1e-9)
 }
 
+/// Resident memory of this process (bytes), now (`VmRSS`) or at most ever (`VmHWM`), where Linux tells.
+pub fn memory(key: &str) -> Option<f64> {
+    let status = read_to_string("/proc/self/status").ok()?;
+    let kilobytes = value(&status, key)?.split(' ').next()?.parse::<f64>();
+    Some(kilobytes.ok()? * 1024.0)
+}
+
+/// From now on the most memory ever is that from now on.
+///
+/// # Errors
+/// Where this is not Linux.
+pub fn begin_peak_of_memory() -> std::io::Result<()> {
+    std::fs::write("/proc/self/clear_refs", "5")
+}
+
 /// The value of `key : value`.
 fn value<'a>(text: &'a str, key: &str) -> Option<&'a str> {
     let line = text.lines().find(|l| l.starts_with(key))?;

@@ -18,7 +18,7 @@ use faer::sparse::linalg::cholesky::{
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 
-use super::substitution::substitute;
+use super::panels::Panels;
 use crate::error::Error;
 
 /// LDLᵀ factors of the lower triangle of a matrix of fixed pattern, with −δ on the diagonal of the
@@ -27,7 +27,7 @@ pub(super) struct QuasiDefinite {
     symbolic: SymbolicCholesky<usize>,
     factors: Vec<f64>,
     /// The factors in single precision, where they are used so.
-    rounded: Option<Vec<f32>>,
+    panels: Option<Panels>,
     values: Vec<f64>,
     diagonal: Vec<u32>,
     signs: Vec<i8>,
@@ -36,7 +36,6 @@ pub(super) struct QuasiDefinite {
     scratch: MemBuffer,
     /// A right-hand side in the order of the factors.
     ordered: Vec<f64>,
-    work: Vec<f64>,
 }
 
 /// Supernodes are merged up to so many columns while zeros are less than this part of them. Substitution reads zeros,
@@ -81,9 +80,13 @@ impl QuasiDefinite {
             .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
         let scratch = MemBuffer::try_new(need)
             .map_err(|_| Error::LinearSolver("out of memory".to_owned()))?;
+        let panels = match symbolic.raw() {
+            SymbolicCholeskyRaw::Supernodal(supernodes) if loose => Some(Panels::new(supernodes)),
+            _ => None,
+        };
         Ok(Self {
             factors: vec![0.0; symbolic.len_val()],
-            rounded: loose.then(Vec::new),
+            panels,
             symbolic,
             values: vec![0.0; pattern.row_idx().len()],
             signs: (0..diagonal.len())
@@ -94,7 +97,6 @@ impl QuasiDefinite {
             regularisation,
             scratch,
             ordered: vec![0.0; pattern.nrows()],
-            work: Vec::new(),
         })
     }
 
@@ -122,23 +124,22 @@ impl QuasiDefinite {
                 Default::default(),
             )
             .map_err(|e| Error::LinearSolver(format!("{e:?}")))?;
-        if let Some(rounded) = &mut self.rounded {
-            rounded.clear();
-            rounded.extend(self.factors.iter().map(|f| *f as f32));
+        if let (SymbolicCholeskyRaw::Supernodal(supernodes), Some(panels)) =
+            (self.symbolic.raw(), &mut self.panels)
+        {
+            panels.load(supernodes, &self.factors);
         }
         Ok(())
     }
 
     /// Overwrites x with S⁻¹ x; there must be factors.
     pub(super) fn solve(&mut self, x: &mut [f64]) {
-        if let (SymbolicCholeskyRaw::Supernodal(supernodes), Some(order), Some(rounded)) =
-            (self.symbolic.raw(), self.symbolic.perm(), &self.rounded)
-        {
+        if let (Some(order), Some(panels)) = (self.symbolic.perm(), &mut self.panels) {
             let (forward, _) = order.arrays();
             for (y, &from) in self.ordered.iter_mut().zip(forward) {
                 *y = x[from];
             }
-            substitute(supernodes, rounded, &mut self.ordered, &mut self.work);
+            panels.substitute(&mut self.ordered);
             for (y, &to) in self.ordered.iter().zip(forward) {
                 x[to] = *y;
             }
@@ -150,6 +151,86 @@ impl QuasiDefinite {
             MatMut::from_column_major_slice_mut(x, rows, 1),
             Par::Seq,
             MemStack::new(&mut self.scratch),
+        );
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::linear_solver::Blocks;
+
+    /// The membrane of a square grid with a pressure for each second unknown: supernodes of many widths.
+    fn membrane(side: usize) -> (QuasiDefinite, Vec<f64>, Vec<Vec<f64>>) {
+        let definite = side * side;
+        let size = definite + definite / 2;
+        let mut blocks = Blocks::default();
+        let mut coefficients = Vec::new();
+        let mut add = |rows: [usize; 2], values: [f64; 4]| {
+            blocks.push(rows, rows);
+            coefficients.extend(values);
+        };
+        for j in 0..definite {
+            if j % side + 1 < side {
+                add([j, j + 1], [1.1, -1.0, -1.0, 1.3]);
+            }
+            if j + side < definite {
+                add([j, j + side], [0.9, -0.7, -0.7, 1.0]);
+            }
+        }
+        for cell in 0..definite / 2 {
+            add([2 * cell, definite + cell], [0.1, 0.5, 0.5, 0.0]);
+        }
+        (0..size).for_each(|i| blocks.push([i], [i]));
+        let (pattern, slots) = blocks.pattern(size);
+        let (slots, diagonal) = slots.split_at(coefficients.len());
+        let mut values = vec![0.0; pattern.row_idx().len()];
+        for (&slot, c) in slots.iter().zip(&coefficients) {
+            values[slot as usize] += c;
+        }
+        let mut dense = vec![vec![0.0; size]; size];
+        for (column, bounds) in pattern.col_ptr().windows(2).enumerate() {
+            for slot in bounds[0]..bounds[1] {
+                dense[pattern.row_idx()[slot]][column] = values[slot];
+            }
+        }
+        let delta = 0.5;
+        (definite..size).for_each(|i| dense[i][i] -= delta);
+        let diagonal = diagonal.to_vec();
+        let mut factors =
+            QuasiDefinite::new(pattern.as_ref(), definite, delta, diagonal, None, true).unwrap();
+        factors.factorise(pattern.as_ref(), &values).unwrap();
+        let x = (0..size).map(|n| (1.7 * n as f64).sin()).collect();
+        (factors, x, dense)
+    }
+
+    /// Factors in single precision solve the system to single precision, whatever the widths of supernodes.
+    #[test]
+    fn panels_solve_the_system_to_single_precision() {
+        for side in [2, 7, 19] {
+            let (mut factors, expected, dense) = membrane(side);
+            assert!(factors.panels.is_some());
+            let product = |row: &Vec<f64>| row.iter().zip(&expected).map(|(a, x)| a * x).sum();
+            let mut x: Vec<f64> = dense.iter().map(product).collect();
+            factors.solve(&mut x);
+            let miss = x.iter().zip(&expected).map(|(x, e)| (x - e).abs());
+            let miss = miss.fold(0.0_f64, f64::max);
+            assert!(miss < 1e-4, "{side}: {miss}");
+        }
+    }
+
+    /// What the processor is told to do gives the bits of plain loops.
+    #[test]
+    fn every_processor_gives_the_same_bits() {
+        let (mut factors, start, _) = membrane(19);
+        let panels = factors.panels.as_mut().unwrap();
+        let (mut fast, mut plain) = (start.clone(), start);
+        panels.substitute(&mut fast);
+        panels.substitute_by::<crate::linear_solver::lanes::Plain>(&mut plain);
+        assert!(
+            fast.iter()
+                .zip(&plain)
+                .all(|(a, b)| a.to_bits() == b.to_bits())
         );
     }
 }

@@ -16,6 +16,8 @@
 mod evaluation;
 mod part;
 
+use std::time::Instant;
+
 use serde::{Deserialize, Serialize};
 
 use super::coefficients::StepMatrix;
@@ -117,6 +119,9 @@ const LOOSEST: f64 = 50.0;
 /// A linear solution that leaves more than this is hardly one.
 const WEAKEST: f64 = 0.3;
 
+/// Cells may go to and fro as long as what is left falls below this part of what it was.
+const PROGRESS: f64 = 0.5;
+
 /// Most parts that are solved between two iterations of the whole: what is left of one lies beside it.
 const MOST_PARTS: usize = 4;
 
@@ -172,6 +177,27 @@ pub struct PrimalDual<const C: usize = COMPONENTS> {
     evaluations: Vec<Evaluation<C>>,
     /// at this ε; NaN if the state has changed since.
     evaluated_at: f64,
+    times: SolverTimes,
+}
+
+/// Wall time that went into the costly parts of steps (s); the rest of a step evaluates the law, assembles and updates.
+#[derive(Debug, Clone, Copy, PartialEq, Default, Serialize)]
+pub struct SolverTimes {
+    /// Numerical factors, whether of the symmetric part or of the whole.
+    pub factors: f64,
+    /// Krylov iterations, most of it substitution in the factors.
+    pub krylov: f64,
+    /// Newton's method on parts of the unknowns, with the factors and iterations of these.
+    pub parts: f64,
+}
+
+impl SolverTimes {
+    /// Adds those of other steps.
+    pub fn add(&mut self, other: &Self) {
+        self.factors += other.factors;
+        self.krylov += other.krylov;
+        self.parts += other.parts;
+    }
 }
 
 impl<const C: usize> PrimalDual<C> {
@@ -226,7 +252,13 @@ impl<const C: usize> PrimalDual<C> {
             misses: vec![0.0; discretisation.points().len()],
             evaluations: vec![Evaluation::default(); discretisation.points().len()],
             evaluated_at: f64::NAN,
+            times: SolverTimes::default(),
         })
+    }
+
+    /// What has been spent since the last call.
+    pub fn take_times(&mut self) -> SolverTimes {
+        std::mem::take(&mut self.times)
     }
 
     /// One run of Newton's method on `self.trial`, which starts as a copy of `start`; it ends at the residuals
@@ -262,12 +294,15 @@ impl<const C: usize> PrimalDual<C> {
         }
         // Points whose law was missed when a part could not be solved: there is hope again when they are fewer.
         let mut in_vain = usize::MAX;
+        // What was left over what is allowed when the count of changes to and fro began.
+        let mut left_when_counting = f64::INFINITY;
         for iteration in 0..strategy.max_iterations {
             self.release(problem.discretisation, iteration == 0);
             self.linearise(problem, floor);
             self.assemble(problem, u_old);
             report.iterations += 1;
             report.linear_solves += 1;
+            let clock = Instant::now();
             let system = &mut self.matrix.system;
             let prepared = if keeps && floor == floor_of_factors {
                 system.keep_or_factorise()
@@ -277,6 +312,9 @@ impl<const C: usize> PrimalDual<C> {
             floor_of_factors = floor;
             let solved = prepared
                 .and_then(|()| system.solve(&self.right_hand_side, &mut self.change, tolerance));
+            let factors = system.take_factor_time();
+            self.times.factors += factors;
+            self.times.krylov += clock.elapsed().as_secs_f64() - factors;
             if solved.is_err() {
                 return;
             }
@@ -299,7 +337,9 @@ impl<const C: usize> PrimalDual<C> {
                 if 2 * missed > in_vain {
                     break;
                 }
+                let clock = Instant::now();
                 let outcome = self.solve_part(problem, u_old, &allowed, report);
+                self.times.parts += clock.elapsed().as_secs_f64();
                 if outcome == Outcome::TooLarge {
                     break;
                 }
@@ -320,8 +360,18 @@ impl<const C: usize> PrimalDual<C> {
                 report.converged = true;
                 return;
             }
-            if self.conflicts.is_cycling() {
-                return;
+            let left = report.residuals.over(&allowed);
+            if !is_last_floor || iteration == 0 {
+                // What changes on the way down is no conflict yet,
+                left_when_counting = left;
+                self.conflicts.begin();
+            } else if self.conflicts.is_cycling() {
+                // nor is what changes while the rest converges.
+                if left > PROGRESS * left_when_counting {
+                    return;
+                }
+                left_when_counting = left;
+                self.conflicts.begin();
             }
             if fraction >= 0.5 {
                 floor = (floor * strategy.factor).max(self.options.strain_rate_floor);

@@ -1,5 +1,6 @@
 //! The steps: grains under what is held, and the exchange that follows so many of them.
 
+use super::angular::AngularBook;
 use super::averages::Sight;
 use super::edge::ZoneEdge;
 use super::settings::NormalMotion;
@@ -33,11 +34,15 @@ impl<L: ShearLaw + Copy> Overlap<L> {
         while left > 0 {
             let of_loads = self.made % self.steps_of_loads;
             if of_loads == 0 {
+                if std::mem::take(&mut self.opens_angular) {
+                    self.angular = Some(AngularBook::open(simulation));
+                }
                 self.shell.lay(
                     simulation,
                     (&self.edge, &self.strip),
                     (self.settings.impedance, self.normal_velocity),
                     &self.held,
+                    self.angular.as_mut(),
                 )?;
             }
             let part = left.min(self.steps_of_loads - of_loads);
@@ -59,7 +64,15 @@ impl<L: ShearLaw + Copy> Overlap<L> {
         let weight = [gravity[self.edge.flow_axis], gravity.dot(&n)].map(|g| self.grain_mass * g);
         let timestep = simulation.timestep();
         let mut kick = simulation.next_kick();
-        simulation.advance(steps)?;
+        match &mut self.angular {
+            None => simulation.advance(steps)?,
+            Some(book) => {
+                for _ in 0..steps {
+                    book.see(simulation);
+                    simulation.advance(1)?;
+                }
+            }
+        }
         for _ in 0..steps {
             self.given.add(&self.shell.laid, kick);
             self.shell.acted += kick;

@@ -22,6 +22,7 @@
 //! edge, flat and normal to an axis, is joined to one column ([`FlatEdge`]); what acts on grains goes by the
 //! questions of [`ZoneEdge`] alone.
 
+mod angular;
 mod averages;
 pub mod bowl;
 mod edge;
@@ -40,6 +41,7 @@ mod sighting;
 mod start;
 mod strip;
 
+pub use angular::AngularBook;
 pub use averages::{Averages, FaceStress, Node};
 pub use edge::{FlatEdge, ZoneEdge};
 pub use far_side::FarSide;
@@ -133,6 +135,9 @@ pub struct Overlap<L> {
     /// Mass of the free grains (kg).
     grain_mass: f64,
     sighting: Sighting,
+    /// The account of angular momentum, and whether it is to be opened with the next loads.
+    angular: Option<AngularBook>,
+    opens_angular: bool,
 }
 
 impl<L: ShearLaw + Copy> Overlap<L> {
@@ -234,6 +239,8 @@ impl<L: ShearLaw + Copy> Overlap<L> {
             mass_beyond,
             grain_mass: free_mass(simulation),
             sighting,
+            angular: None,
+            opens_angular: false,
         }
     }
 
@@ -293,6 +300,16 @@ impl<L: ShearLaw + Copy> Overlap<L> {
     /// Work of what acts on the grains since the start (J).
     pub fn work(&self, simulation: &Simulation) -> Work {
         self.shell.work_until_now(simulation)
+    }
+
+    /// Books angular momentum from the next loads on; a checkpoint does not hold the account.
+    pub fn open_angular_book(&mut self) {
+        self.opens_angular = true;
+    }
+
+    /// The account of angular momentum, if it is open.
+    pub fn angular_book(&self) -> Option<&AngularBook> {
+        self.angular.as_ref()
     }
 
     /// Velocity of the continuum along n (m/s).

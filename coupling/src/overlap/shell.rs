@@ -13,6 +13,7 @@
 //!
 //! These forces are formed every few steps of the grains and held in between; what they give is booked every step.
 
+use super::angular::{AngularBook, Counterpart, Parts};
 use super::edge::ZoneEdge;
 use super::strip::Strip;
 use colluvium_dem::{GrainSample, Load, SetupError, Simulation};
@@ -189,7 +190,12 @@ impl Shell {
         (edge, strip): (&E, &Strip),
         (impedance, continuum_velocity): (f64, f64),
         held: &Held,
+        mut book: Option<&mut AngularBook>,
     ) -> Result<(), SetupError> {
+        if let Some(book) = &mut book {
+            book.begin();
+        }
+        let mut answer = Counterpart::default();
         let [weight, momentum] = self.weigh(simulation, edge, strip);
         let mean = (weight > 0.0).then(|| momentum / weight);
         let area = edge.area();
@@ -211,6 +217,8 @@ impl Shell {
                 turn += spin;
                 laid.relaxation[k] += grain.mass * acceleration;
                 laid.spin[k] += inertia * spin;
+                let node = grain.position + (strip.node(k) - near.s) * n;
+                answer.add(1, &node, &(grain.mass * acceleration * t));
             }
             let mut pull = Pull {
                 traction: share * (held.shear * t - held.pressure * n),
@@ -232,6 +240,19 @@ impl Shell {
                 moment: pull.moment,
             });
             self.pulls[grain.id as usize] = pull;
+            let traction = pull.traction + pull.impedance;
+            answer.add(0, &(grain.position - near.s * n), &traction);
+            if let Some(book) = &mut book {
+                let parts = Parts {
+                    traction,
+                    relaxation: pull.relaxation,
+                    moment: pull.moment,
+                };
+                book.lay(grain.id, parts);
+            }
+        }
+        if let Some(book) = book {
+            book.answered_by(answer);
         }
         self.acted = 0.0;
         simulation.set_loads(&self.loads)

@@ -1,6 +1,6 @@
 //! What an overlap keeps account of: conservation, restarts, allocations, and what it refuses.
 
-use crate::world::{Bed, rheology, small_bed, steps};
+use super::world::{Bed, rheology, small_bed, steps};
 use colluvium_continuum::rheology::MuI;
 use colluvium_coupling::overlap::{
     NormalMotion, Overlap, OverlapError, OverlapSettings, StressKernel,

@@ -1,6 +1,6 @@
 //! Profiles of a joined run beside those of the full run in the same window.
 
-use crate::world::{DENSITY, steps};
+use super::world::{DENSITY, steps};
 use colluvium_coupling::coarse_graining::{Averager, Layering, Layers, Profile, ProfileRow};
 use colluvium_dem::{Simulation, Snapshot};
 

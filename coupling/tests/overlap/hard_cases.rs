@@ -1,8 +1,8 @@
 //! Hard cases of an edge that moves with the material: a pile that rests, a spray, contacts much stiffer and grains much
 //! lighter than the continuum's step would like, and a million steps of rest.
 
-use crate::material::{EDGE, HEIGHT, Joined, settled, settled_fraction, setup, spec, stiff_spec};
-use crate::world::{DENSITY, STEP, STIFFNESS};
+use super::material::{EDGE, HEIGHT, Joined, settled, settled_fraction, setup, spec, stiff_spec};
+use super::world::{DENSITY, STEP, STIFFNESS};
 use colluvium_dem::*;
 use nalgebra::Vector3;
 

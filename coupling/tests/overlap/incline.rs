@@ -1,8 +1,8 @@
 //! Flow down an incline, grains on one side of the edge and continuum on the other, against grains alone over
 //! the same window. Every joined run starts from the full run's own state.
 
-use crate::comparison::{Errors, continuum_error, mean, profile};
-use crate::world::{Bed, deep_bed, small_bed};
+use super::comparison::{Errors, continuum_error, mean, profile};
+use super::world::{Bed, deep_bed, small_bed};
 use colluvium_continuum::rheology::MuI;
 use colluvium_coupling::coarse_graining::Profile;
 use colluvium_coupling::overlap::force_blending::ForceBlending;
@@ -168,10 +168,10 @@ fn show(name: &str, outcome: &Outcome) {
     );
     let r = &outcome.report;
     println!(
-        "  slip {:+.2} %, sigma_D/sigma_C: shear {:.3}, pressure {:.3}; escaped {}, relaxation {:.1} % of the traction",
+        "  slip {:+.2} %, sigma_D/sigma_C: shear {:.3?}, pressure {:.3?}; escaped {}, relaxation {:.1} % of the traction",
         100.0 * r.slip,
-        r.shear_ratio.unwrap(),
-        r.pressure_ratio.unwrap(),
+        r.shear_ratio,
+        r.pressure_ratio,
         r.escaped,
         100.0 * r.relaxation_share
     );
@@ -330,6 +330,54 @@ fn grains_below_at_24_degrees() {
 #[ignore = "two minutes; run by tests/validate.sh"]
 fn grains_below_at_26_degrees() {
     grains_below(26.0);
+}
+
+/// The reverse in a shallow flow, and its control: with nothing exchanged grains fall into the gap below them.
+#[test]
+fn grains_above_are_borne_by_a_continuum() {
+    let case = Case {
+        window: [4.0, 10.0],
+        ..short()
+    };
+    let flow = case.flow();
+    let full = case.full(&flow);
+    let joined = |uncoupled| {
+        let settings = OverlapSettings {
+            impedance: Some(400.0),
+            uncoupled,
+            ..Default::default()
+        };
+        let spec = case.bed.continuum_below(4.0, settings);
+        let outcome = case.join(&flow, &full, spec);
+        show(
+            if uncoupled {
+                "nothing exchanged"
+            } else {
+                "grains above"
+            },
+            &outcome,
+        );
+        outcome
+    };
+    let (held, fallen) = (joined(false), joined(true));
+    let inner = &held.inner;
+    assert!(
+        inner.pressure.abs() < 0.04 && inner.shear.abs() < 0.08,
+        "{inner}"
+    );
+    assert!(inner.solid_fraction.abs() < 0.05, "{inner}");
+    assert!(held.report.escaped == 0.0, "{:?}", held.report);
+    assert!(held.ledger.iter().all(|e| *e < 1e-11));
+    let worst = fallen
+        .inner
+        .pressure
+        .abs()
+        .max(fallen.inner.solid_fraction.abs());
+    assert!(
+        fallen.report.escaped > 10.0 && worst > 0.2,
+        "{:?}",
+        fallen.report
+    );
 }
 
 /// Grains over a continuum on a rough base. Stresses hold; the velocity does not, by what μ(I) and no slip lack at

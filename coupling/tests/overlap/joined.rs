@@ -1,7 +1,7 @@
 //! The run that begins as grains and goes on joined: in pieces, resumed, and beside what it must refuse.
 
-use crate::comparison::continuum_error;
-use crate::world::{STIFFNESS, law, rheology, small_bed};
+use super::comparison::continuum_error;
+use super::world::{STIFFNESS, law, rheology, small_bed};
 use colluvium_coupling::incline::{InclineSpec, Purpose, Start};
 use colluvium_coupling::overlap::OverlapSettings;
 use colluvium_coupling::overlap::joined_incline::{
@@ -16,7 +16,7 @@ fn spec() -> JoinedInclineSpec {
             slope: 24.0_f64.to_radians(),
             gravity: 1.0,
             diameter: 1.0,
-            grain_density: crate::world::DENSITY,
+            grain_density: super::world::DENSITY,
             law: law(),
             domain: bed.domain,
             bed: bed.grains.clone(),
@@ -24,7 +24,7 @@ fn spec() -> JoinedInclineSpec {
                 inertial_number: 0.16,
             },
             purpose: Purpose::Measure,
-            timestep: crate::world::STEP,
+            timestep: super::world::STEP,
             relax_time: 6.0,
             average_time: 4.0,
             max_time: 12.0,

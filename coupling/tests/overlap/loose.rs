@@ -1,6 +1,6 @@
 //! Single grains that leave their neighbours at an edge which moves with the material: into the continuum, or over the heap.
 
-use crate::material::{EDGE, HEIGHT, Joined, settled, settled_fraction, setup, spec};
+use super::material::{EDGE, HEIGHT, Joined, settled, settled_fraction, setup, spec};
 use colluvium_dem::*;
 use nalgebra::Vector3;
 

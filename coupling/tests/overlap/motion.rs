@@ -1,7 +1,7 @@
 //! Motions that must not be disturbed: uniform translation, and shear between plates.
 
-use crate::comparison::profile;
-use crate::world::{Bed, DENSITY, deep_bed, law, rheology, scales, small_bed, steps};
+use super::comparison::profile;
+use super::world::{Bed, DENSITY, deep_bed, law, rheology, scales, small_bed, steps};
 use colluvium_continuum::grid::Boundary;
 use colluvium_continuum::rheology::MuI;
 use colluvium_coupling::coarse_graining::ProfileRow;
@@ -140,14 +140,20 @@ struct Sheared {
     report: Report,
 }
 
-fn shear(bed: &Bed, height: f64, window: [f64; 2]) -> Sheared {
+fn shear(
+    bed: &Bed,
+    height: f64,
+    window: [f64; 2],
+    nudge: f64,
+    settings: OverlapSettings,
+) -> Sheared {
     let pressure = 10.0;
     let rate = 0.15 * (pressure / DENSITY).sqrt();
     let mut setup = bed.tilted(0.0);
     setup.gravity = Vector3::zeros();
     let mut simulation = Simulation::new(setup).unwrap();
-    simulation.give_velocity(|g| Vector3::x() * rate * g.position.z.max(0.0));
-    let mut spec = bed.continuum_above(height, OverlapSettings::default());
+    simulation.give_velocity(|g| Vector3::x() * (rate * g.position.z.max(0.0) + nudge));
+    let mut spec = bed.continuum_above(height, settings);
     spec.far_end = Boundary::LoadedWall {
         velocity: rate * bed.depth,
         pressure,
@@ -176,10 +182,14 @@ fn shear(bed: &Bed, height: f64, window: [f64; 2]) -> Sheared {
     let mean = |[low, high]: [f64; 2], value: fn(&ProfileRow) -> f64| {
         rows(low, high).map(value).sum::<f64>() / rows(low, high).count() as f64
     };
+    // By least squares.
     let slope = |low: f64, high: f64| {
         let points: Vec<_> = rows(low, high).map(|r| (r.z, r.u.value)).collect();
-        let (first, last) = (points[0], points[points.len() - 1]);
-        (last.1 - first.1) / (last.0 - first.0)
+        let centre = points.iter().map(|p| p.0).sum::<f64>() / points.len() as f64;
+        let sums = points.iter().fold([0.0; 2], |[uz, zz], (z, u)| {
+            [uz + (z - centre) * u, zz + (z - centre).powi(2)]
+        });
+        sums[0] / sums[1]
     };
     let cell = |from: usize, to: usize| {
         (sums[to] - sums[from]) / count / ((to - from) as f64 * strip.cell)
@@ -200,36 +210,126 @@ fn shear(bed: &Bed, height: f64, window: [f64; 2]) -> Sheared {
     sheared
 }
 
-/// Rates and the ratio of shear stresses at m within these.
-fn is_handed_over(sheared: &Sheared, rates: f64, ratio: f64) {
-    let [below, inner, _] = sheared.grains;
-    for rate in [inner, sheared.continuum[0], sheared.continuum[1]] {
-        assert!((rate / below - 1.0).abs() < rates, "{rate} {below}");
-    }
-    let report = &sheared.report;
-    assert!(report.slip.abs() < 0.015, "{report:?}");
-    assert!(
-        (report.shear_ratio.unwrap() - 1.0).abs() < ratio,
-        "{report:?}"
-    );
-    for pressure in sheared.pressure {
-        assert!((pressure - 1.0).abs() < 0.03, "{pressure}");
-    }
-    let [below, inner] = sheared.solid_fraction;
-    assert!((inner / below - 1.0).abs() < 0.03, "{inner} {below}");
+/// How far rates may be from that of the grains in the inner overlap.
+struct Limits {
+    /// Of the continuum's copy there: no kink in u.
+    copy: f64,
+    /// Of the continuum beyond the edge.
+    far: f64,
+    /// Of the grains below the overlap.
+    below: f64,
+    /// Ratio of shear stresses at m, from 1.
+    stress: f64,
 }
 
-/// Seven diameters over the base its heat still speeds up the grains next to the overlap, and rates over three layers in
-/// so short a window scatter by a fifth.
+/// The mean of several runs.
+fn mean(runs: &[Sheared]) -> Sheared {
+    let n = runs.len() as f64;
+    let of = |f: &dyn Fn(&Sheared) -> f64| runs.iter().map(f).sum::<f64>() / n;
+    let report = &runs[0].report;
+    Sheared {
+        grains: [0, 1, 2].map(|k| of(&|run| run.grains[k])),
+        continuum: [0, 1].map(|k| of(&|run| run.continuum[k])),
+        pressure: [0, 1].map(|k| of(&|run| run.pressure[k])),
+        solid_fraction: [0, 1].map(|k| of(&|run| run.solid_fraction[k])),
+        report: Report {
+            slip: of(&|run| run.report.slip),
+            shear_ratio: Some(of(&|run| run.report.shear_ratio.unwrap_or(f64::INFINITY))),
+            escaped: of(&|run| run.report.escaped),
+            ..*report
+        },
+    }
+}
+
+/// Whether everything goes over within these limits; what does not, in words.
+fn missed(sheared: &Sheared, limits: &Limits) -> Vec<String> {
+    let [below, inner, _] = sheared.grains;
+    let [copy, far] = sheared.continuum;
+    let report = &sheared.report;
+    let solid = sheared.solid_fraction;
+    let checks = [
+        ("rate of the copy", copy / inner - 1.0, limits.copy),
+        ("rate of the continuum", far / inner - 1.0, limits.far),
+        ("rate below", below / inner - 1.0, limits.below),
+        ("slip", report.slip, 0.015),
+        (
+            "ratio of shear stresses",
+            report.shear_ratio.unwrap_or(f64::INFINITY) - 1.0,
+            limits.stress,
+        ),
+        ("pressure below", sheared.pressure[0] - 1.0, 0.03),
+        ("pressure in the overlap", sheared.pressure[1] - 1.0, 0.03),
+        ("solid fraction", solid[1] / solid[0] - 1.0, 0.03),
+        ("grains escaped", report.escaped, 0.5),
+    ];
+    let misses = checks.into_iter().filter(|(_, miss, limit)| {
+        // Not a number misses.
+        miss.abs() >= *limit || miss.is_nan()
+    });
+    misses
+        .map(|(name, miss, _)| format!("{name}: {miss:+.3}"))
+        .collect()
+}
+
+/// Over a hundred units of time the rates of four runs scatter by 4 % below the overlap, 2.5 % in it, 0.5 % in the copy and 2 %
+/// beyond. What is left is no noise: grains two to four diameters over the base are heated by it and shear by 28 % faster
+/// than those of the overlap, and these by 6 % more slowly than the law says. The control: nothing is exchanged, and the
+/// layer without its load flies apart.
 #[test]
 fn plane_shear_keeps_stress_density_and_velocity() {
-    is_handed_over(&shear(small_bed(), 10.0, [20.0, 30.0]), 0.45, 0.12);
+    let limits = Limits {
+        copy: 0.08,
+        far: 0.15,
+        below: 0.40,
+        stress: 0.07,
+    };
+    let joined = shear(
+        small_bed(),
+        10.0,
+        [20.0, 100.0],
+        0.0,
+        OverlapSettings::default(),
+    );
+    assert_eq!(missed(&joined, &limits), [""; 0]);
+    let settings = OverlapSettings {
+        uncoupled: true,
+        ..Default::default()
+    };
+    let control = missed(
+        &shear(small_bed(), 10.0, [20.0, 30.0], 0.0, settings),
+        &limits,
+    );
+    println!("nothing exchanged: {control:?}");
+    for name in ["ratio of shear stresses", "pressure in the overlap"] {
+        assert!(
+            control.iter().any(|miss| miss.starts_with(name)),
+            "{control:?}"
+        );
+    }
 }
 
-/// Velocity, stress and density go over without a step. The shear rate does not quite: in two runs that differ in the last
-/// bit, grains in the inner overlap sheared 9 and 20 % more slowly than those below (single runs scatter as widely).
+/// Far from the base, the mean of three runs that differ in the last bit: velocity, stress and density go over without a step.
+/// The rate has a shallow dip, which is no noise: grains of the overlap, packed 0.8 % denser, sheared by 15 % more slowly than
+/// those below and than the continuum beyond (single rates scatter by 4 %), and their copy by 5 % faster than they.
 #[test]
-#[ignore = "half a minute; run by tests/validate.sh"]
+#[ignore = "two minutes; run by tests/validate.sh"]
 fn plane_shear_of_a_deep_layer_keeps_stress_density_and_velocity() {
-    is_handed_over(&shear(deep_bed(), 16.0, [40.0, 60.0]), 0.25, 0.05);
+    let limits = Limits {
+        copy: 0.10,
+        far: 0.20,
+        below: 0.22,
+        stress: 0.05,
+    };
+    let of = |k: u8| {
+        let nudge = 1e-7 * f64::from(k);
+        shear(
+            deep_bed(),
+            16.0,
+            [40.0, 160.0],
+            nudge,
+            OverlapSettings::default(),
+        )
+    };
+    let runs = [0, 1, 2].map(of);
+    assert_eq!(missed(&mean(&runs), &limits), [""; 0]);
 }

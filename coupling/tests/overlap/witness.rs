@@ -1,7 +1,7 @@
 //! What goes through the surface of a joint in grains alone.
 
-use crate::material::{EDGE, settled_fraction, setup, spec};
-use crate::world::{DENSITY, STEP, STIFFNESS, law};
+use super::material::{EDGE, settled_fraction, setup, spec};
+use super::world::{DENSITY, STEP, STIFFNESS, law};
 use colluvium_coupling::overlap::material_edge::Witness;
 use colluvium_dem::*;
 use nalgebra::Vector3;

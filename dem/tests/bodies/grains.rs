@@ -1,6 +1,6 @@
 //! Bodies among grains: impacts, accounts, restarts, threads.
 
-use crate::scene::*;
+use super::scene::*;
 use colluvium_dem::*;
 use nalgebra::{UnitQuaternion, Vector3};
 

@@ -1,6 +1,6 @@
 //! Impacts of bodies on walls and on each other.
 
-use crate::scene::*;
+use super::scene::*;
 use colluvium_dem::walls::Mesh;
 use colluvium_dem::*;
 use nalgebra::{UnitQuaternion, Vector3};

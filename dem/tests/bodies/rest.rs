@@ -1,6 +1,6 @@
 //! Bodies at rest, sliding, rolling and piled up.
 
-use crate::scene::*;
+use super::scene::*;
 use colluvium_dem::*;
 use nalgebra::{UnitQuaternion, Vector3};
 

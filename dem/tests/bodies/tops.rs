@@ -1,6 +1,6 @@
 //! Free tops and pendulums against their exact solutions.
 
-use crate::scene::*;
+use super::scene::*;
 use colluvium_dem::*;
 use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::{PI, TAU};

@@ -1,6 +1,6 @@
 //! Loads, fields, launches, clumps, and what is refused.
 
-use crate::scene::*;
+use super::scene::*;
 use colluvium_dem::*;
 use nalgebra::{Matrix3, Vector3};
 

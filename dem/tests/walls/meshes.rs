@@ -1,6 +1,6 @@
 //! Meshes against the analytic walls they stand for.
 
-use crate::scene::*;
+use super::scene::*;
 use colluvium_dem::walls::{Mesh, Rotation, Sine};
 use colluvium_dem::*;
 use nalgebra::{Rotation3, Vector3};

@@ -1,6 +1,6 @@
 //! Walls in motion.
 
-use crate::scene::*;
+use super::scene::*;
 use colluvium_dem::walls::{Rotation, Servo, Sine, Staircase, Table, Target};
 use colluvium_dem::*;
 use nalgebra::Vector3;

@@ -1,6 +1,6 @@
 //! Resting shapes.
 
-use crate::scene::*;
+use super::scene::*;
 use colluvium_dem::walls::{Ends, Frustum};
 use colluvium_dem::*;
 use nalgebra::Vector3;

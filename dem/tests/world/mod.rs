@@ -1,7 +1,5 @@
 //! One law of each kind, and a world that exercises them: shared by the tests beside this folder.
 
-#![allow(dead_code)]
-
 use colluvium_dem::*;
 use nalgebra::Vector3;
 use rand::{RngExt, SeedableRng};

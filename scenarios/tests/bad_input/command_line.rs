@@ -1,6 +1,6 @@
 //! The command line, scene files, where results go.
 
-use crate::Case;
+use super::Case;
 
 /// Arguments, and what the message has to contain.
 pub const CASES: &[Case] = &[

@@ -1,6 +1,6 @@
 //! The layer of continuum and its rheologies.
 
-use crate::Case;
+use super::Case;
 
 /// Arguments, and what the message has to contain.
 pub const CASES: &[Case] = &[

@@ -1,6 +1,6 @@
 //! Impacts and beds: sizes, laws, steps.
 
-use crate::Case;
+use super::Case;
 use crate::command::colluvium;
 use std::fs;
 

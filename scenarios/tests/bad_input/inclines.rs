@@ -1,6 +1,6 @@
 //! Inclines of grains, of continuum, of both, and campaigns on them.
 
-use crate::Case;
+use super::Case;
 
 /// Arguments, and what the message has to contain.
 pub const CASES: &[Case] = &[

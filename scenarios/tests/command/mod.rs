@@ -1,10 +1,9 @@
 //! Running the binary and reading what it wrote.
 
-#![allow(dead_code)] // each test file uses its own part
-
 use serde_json::Value;
 use std::path::Path;
 use std::process::{Command, Output};
+use std::time::Duration;
 
 /// A cliff of some 250 parcels; softer grains than the paper's allow longer steps.
 pub const SMALL_COMET_CLIFF: &[&str] = &[
@@ -124,6 +123,11 @@ pub fn succeed(folder: &Path, arguments: &[&str]) -> String {
         "not quiet without a terminal: {message}"
     );
     String::from_utf8(done.stdout).unwrap()
+}
+
+/// Between two looks at a run that goes on: whoever looks without a pause takes a core from it.
+pub fn pause() {
+    std::thread::sleep(Duration::from_micros(100));
 }
 
 /// The summary of a run directory.

@@ -1,7 +1,7 @@
 //! Boxes that move, in scenes of one's own: what `history.csv` says of them against what is exact.
 
+use super::{grains, run, write};
 use crate::command::{colluvium, hash, succeed};
-use crate::{grains, run, write};
 use std::f64::consts::PI;
 
 /// A law and a kind of grains.

@@ -1,8 +1,8 @@
 //! Fields that pull, in scenes of one's own.
 
-use crate::boundaries::{BASE, BOX};
+use super::boundaries::{BASE, BOX};
+use super::{grains, run, write};
 use crate::command::{hash, summary, value};
-use crate::{grains, run, write};
 use std::f64::consts::{PI, TAU};
 
 #[test]

@@ -1,7 +1,7 @@
 //! Preparations in scenes of one's own: every step, every law of sizes, regions of any shape, and what is said of them.
 
+use super::grains;
 use crate::command::{Columns, colluvium, succeed, summary, value};
-use crate::grains;
 use serde_json::Value;
 use std::path::Path;
 

@@ -1,7 +1,7 @@
 //! Walls in scenes of one's own: a mesh from Gmsh against a plane, every motion, a servo, what `history.csv` says of them.
 
+use super::{run, write};
 use crate::command::{Columns, colluvium, succeed};
-use crate::{run, write};
 use std::f64::consts::TAU;
 use std::fmt::Write;
 

@@ -111,6 +111,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         };
         let report = solver.step(&problem, &mut self.unknowns)?;
         self.spent.newton += clock.elapsed().as_secs_f64();
+        self.spent.within_newton.add(&solver.take_times());
         record.newton_iterations += report.iterations;
         record.residuals = report.residuals;
         record.held_points = report.held_points;

@@ -9,7 +9,7 @@ use crate::free_surface::faces::ThinLayer;
 use crate::free_surface::fields::CellFields;
 use crate::grid::DIMENSIONS;
 use crate::strain::SPACE_COMPONENTS;
-use crate::yield_step::{PrimalDualOptions, Residuals};
+use crate::yield_step::{PrimalDualOptions, Residuals, SolverTimes};
 
 /// Settings of a flow with a moving surface, in natural units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
@@ -200,8 +200,10 @@ pub struct Spent {
     pub operators: f64,
     /// Analysing the pattern of the matrix.
     pub analysis: f64,
-    /// Newton's method: assembly, factors, Krylov iterations.
+    /// Newton's method: evaluation and assembly, factors, Krylov iterations, parts.
     pub newton: f64,
+    /// What of Newton's method has a clock of its own.
+    pub within_newton: SolverTimes,
 }
 
 /// Fields of a cell of a [`super::SpaceFlow`].

@@ -128,10 +128,16 @@ pub struct Monitors {
     pub iterations: f64,
     /// Largest residual of the continuum's momentum.
     pub residual: f64,
+    /// Σ of the granular temperature ⟨v′²⟩/3 of the buffer, of the inner overlap, and of as much of the grains beyond it
+    /// (m²/s²).
+    pub temperature: [f64; 3],
+    /// Work on the grains of the traction, of the impedance and of the relaxation (J), by velocities when they are laid;
+    /// negative where it takes energy from them.
+    pub work: [f64; 3],
 }
 
 /// Numbers of the monitors.
-pub const MONITORED: usize = 13;
+pub const MONITORED: usize = 19;
 
 impl Monitors {
     /// All of it in a row of numbers.
@@ -150,6 +156,12 @@ impl Monitors {
             self.steps[1],
             self.iterations,
             self.residual,
+            self.temperature[0],
+            self.temperature[1],
+            self.temperature[2],
+            self.work[0],
+            self.work[1],
+            self.work[2],
         ]
     }
 
@@ -166,12 +178,19 @@ impl Monitors {
             steps: [n[9], n[10]],
             iterations: n[11],
             residual: n[12],
+            temperature: [n[13], n[14], n[15]],
+            work: [n[16], n[17], n[18]],
         }
     }
 
     /// Mean rms slip at the handshake surface (m/s).
     pub fn mean_slip(&self) -> f64 {
         self.slip / self.exchanges.max(1.0)
+    }
+
+    /// Mean granular temperatures of the buffer, the inner overlap and the grains beyond it (m²/s²).
+    pub fn temperatures(&self) -> [f64; 3] {
+        self.temperature.map(|sum| sum / self.exchanges.max(1.0))
     }
 
     /// Normal force of the grains' contacts over that of the continuum's at the handshake surface.

@@ -49,6 +49,12 @@ impl Cells {
         i + self.counts[0] * (j + self.counts[1] * k)
     }
 
+    /// Centre of a cell (m).
+    pub fn centre(&self, cell: usize) -> Vector3<f64> {
+        let index = self.index(cell);
+        Vector3::from_fn(|axis, _| self.low[axis] + (index[axis] as f64 + 0.5) * self.spacing[axis])
+    }
+
     /// The cell above one, if there is one.
     pub fn above(&self, cell: usize) -> Option<usize> {
         let above = cell + self.counts[0] * self.counts[1];

@@ -3,6 +3,7 @@
 use super::cells::over;
 use super::continuum::{components, sideways};
 use super::{Bowl, OverlapError};
+use crate::overlap::angular::{AngularBook, Counterpart, Parts};
 use colluvium_dem::{GrainSample, Load, Simulation};
 use nalgebra::Vector3;
 
@@ -20,6 +21,8 @@ pub(super) struct Shell {
     pub weight: f64,
     /// Σ q h (v − u), u the continuum's velocity at the grain (N s).
     pub slip: Vector3<f64>,
+    /// Σ q h v (N s).
+    momentum: Vector3<f64>,
     /// What presses on it and on those above it without grains (N).
     force: Vector3<f64>,
 }
@@ -45,15 +48,25 @@ impl Bowl {
             self.exchange(simulation)?;
             self.made = 0;
             self.exchanges += 1;
+            let before = self
+                .angular
+                .is_some()
+                .then(|| simulation.leapfrog_angular_momentum());
             self.grow(simulation)?;
+            if let Some((book, before)) = self.angular.as_mut().zip(before) {
+                book.hand(&(simulation.leapfrog_angular_momentum() - before));
+            }
         }
         self.lay(simulation)
     }
 
     /// Books the impulses of what was laid over the steps made since.
-    fn book_grains(&mut self, simulation: &Simulation) {
+    pub(super) fn book_grains(&mut self, simulation: &Simulation) {
         self.monitors.grain_steps += simulation.grain_count() as f64 * self.steps_of_loads as f64;
         let time = self.acting(simulation);
+        for (work, power) in self.monitors.work.iter_mut().zip(self.laid.powers) {
+            *work += power * time;
+        }
         for (sum, force) in self.given.relaxation.iter_mut().zip(&self.laid.relaxation) {
             *sum += force * time;
         }
@@ -94,6 +107,21 @@ impl Bowl {
     pub(super) fn lay(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
         self.laid_at = simulation.steps_done();
         self.laid.clear();
+        let mut angular = self.angular.take();
+        let laid = self.lay_noting(simulation, angular.as_mut());
+        self.angular = angular;
+        laid
+    }
+
+    /// Lays them, noting what they consist of.
+    fn lay_noting(
+        &mut self,
+        simulation: &mut Simulation,
+        mut angular: Option<&mut AngularBook>,
+    ) -> Result<(), OverlapError> {
+        if let Some(book) = &mut angular {
+            book.begin();
+        }
         if self.spec.settings.uncoupled {
             return Ok(());
         }
@@ -106,8 +134,9 @@ impl Bowl {
         // Rows may stand in another order after a restart, and sums over them end in other bits.
         scratch.near.sort_unstable_by_key(|grain| grain.id);
         self.weigh(&mut scratch);
-        self.press_on_shell(&mut scratch.shell);
+        let mut answer = self.press_on_shell(&mut scratch.shell);
         let cells = self.layout.cells;
+        let mut power = 0.0;
         scratch.loads.clear();
         for grain in &scratch.near {
             let mut force = Vector3::zeros();
@@ -117,18 +146,35 @@ impl Bowl {
                     force += part / shell.weight * shell.force;
                 }
             }
+            let traction = force;
             for (cell, hat) in cells.hats(&grain.position) {
                 let pull = grain.mass * hat * self.held.accelerations[cell];
                 self.laid.relaxation[cell] += pull;
                 force += pull;
             }
+            power += (force - traction).dot(&grain.velocity);
             if force != Vector3::zeros() {
                 scratch.loads.push(Load {
                     grain: grain.id,
                     force,
                     moment: Vector3::zeros(),
                 });
+                if let Some(book) = &mut angular {
+                    let parts = Parts {
+                        traction,
+                        relaxation: force - traction,
+                        ..Parts::default()
+                    };
+                    book.lay(grain.id, parts);
+                }
             }
+        }
+        self.laid.powers[2] = power;
+        if let Some(book) = angular {
+            for (cell, force) in self.laid.relaxation.iter().enumerate() {
+                answer.add(1, &cells.centre(cell), force);
+            }
+            book.answered_by(answer);
         }
         simulation.set_loads(&scratch.loads)?;
         self.scratch = scratch;
@@ -147,12 +193,15 @@ impl Bowl {
                 shell.weight += part;
                 let u = beside.unwrap_or(self.held.velocity[face]);
                 shell.slip += part * (grain.velocity - u);
+                shell.momentum += part * grain.velocity;
             }
         }
     }
 
-    /// What presses on each face, on the grains that bear it: its own, or those of the next face below with grains.
-    fn press_on_shell(&mut self, shells: &mut [Shell]) {
+    /// What presses on each face, on the grains that bear it: its own, or those of the next face below with grains. Says where
+    /// the continuum has it.
+    fn press_on_shell(&mut self, shells: &mut [Shell]) -> Counterpart {
+        let mut answer = Counterpart::default();
         let impedance = self.spec.settings.impedance;
         for number in 0..self.faces.all.len() {
             let side = self.faces.all[number].side;
@@ -168,7 +217,18 @@ impl Bowl {
             shells[bearer].force += self.held.traction[number] + resistance;
             self.laid.traction += self.held.traction[number];
             self.laid.impedance += resistance;
+            let velocity = over(shells[bearer].momentum, shells[bearer].weight);
+            self.laid.powers[0] += self.held.traction[number].dot(&velocity);
+            self.laid.powers[1] += resistance.dot(&velocity);
+            let beside = self.faces.all[number].cells;
+            let [out, inside] = beside.map(|cell| self.layout.cells.centre(cell));
+            answer.add(
+                0,
+                &(0.5 * (out + inside)),
+                &(self.held.traction[number] + resistance),
+            );
         }
+        answer
     }
 
     /// Averages of the grains to the continuum, its step, and what it does to the grains until the next exchange.

@@ -14,7 +14,7 @@ use colluvium_dem::Simulation;
 use nalgebra::{Matrix3, Vector3};
 
 /// Numbers in front but for the two rows of forces by cell, the account among them.
-const FRONT: usize = 4 + 12 + account::NUMBERS;
+const FRONT: usize = 4 + 12 + 6 + account::NUMBERS;
 
 /// Vectors one behind the other.
 fn flat(rows: &[Vector3<f64>]) -> impl Iterator<Item = f64> {
@@ -40,6 +40,8 @@ impl Bowl {
         for given in [&self.laid, &self.given] {
             front.extend(flat(&[given.traction, given.impedance]));
         }
+        front.extend(self.monitors.work);
+        front.extend(self.laid.powers);
         front.extend(self.account.numbers());
         front.extend(flat(&self.laid.relaxation));
         front.extend(flat(&self.given.relaxation));
@@ -239,6 +241,8 @@ impl<'a> Rows<'a> {
         bowl.owed = vectors(self.owed);
         bowl.monitors = Monitors::of(&self.monitors);
         bowl.monitors.grain_steps = scalars[3];
+        bowl.monitors.work = [scalars[16], scalars[17], scalars[18]];
+        bowl.laid.powers = [scalars[19], scalars[20], scalars[21]];
         bowl.exchanges = self.exchanges as u64;
         bowl.made = scalars[1] as u64;
         bowl.laid_at = scalars[2] as u64;
@@ -248,7 +252,7 @@ impl<'a> Rows<'a> {
             given.relaxation = vectors(&forces[3 * self.cells * k..3 * self.cells * (k + 1)]);
         }
         let mut account = [0.0; account::NUMBERS];
-        account.copy_from_slice(&scalars[16..]);
+        account.copy_from_slice(&scalars[22..]);
         bowl.account = Account::of(&account);
         bowl.flow.set_state(self.state)?;
         Ok(())

@@ -40,6 +40,7 @@ pub use journey::{Growth, Move, Reason};
 pub use zone::Zone;
 
 use super::OverlapError;
+use super::angular::AngularBook;
 use super::rest_stress::RestStress;
 use super::settings::{Resolved, check};
 use super::sighting::{Sighting, free_mass};
@@ -234,6 +235,8 @@ struct Given {
     relaxation: Vec<Vector3<f64>>,
     traction: Vector3<f64>,
     impedance: Vector3<f64>,
+    /// Powers of traction, impedance and relaxation when they were laid (W); of what is laid alone.
+    powers: [f64; 3],
 }
 
 impl Given {
@@ -247,6 +250,7 @@ impl Given {
     fn clear(&mut self) {
         self.relaxation.fill(Vector3::zeros());
         (self.traction, self.impedance) = (Vector3::zeros(), Vector3::zeros());
+        self.powers = [0.0; 3];
     }
 }
 
@@ -296,6 +300,7 @@ pub struct Bowl {
     sighting: Sighting,
     scratch: exchange::Scratch,
     outside: Outside<3, 5>,
+    angular: Option<AngularBook>,
 }
 
 impl Bowl {
@@ -402,6 +407,7 @@ impl Bowl {
             sighting: Sighting::default(),
             scratch: exchange::Scratch::default(),
             outside: Outside::nothing(count),
+            angular: None,
             least: Vec::new(),
             faces: Faces::default(),
             handshake: Faces::default(),
@@ -486,6 +492,29 @@ impl Bowl {
         account.relaxation += relaxation * time;
         account.weight += simulation.gravity() * self.grain_mass * time;
         account
+    }
+
+    /// Books angular momentum of the grains, ball included, from now on, for which [`see_step`](Self::see_step) has to be called before every step
+    /// of the grains; what is written does not hold the account.
+    ///
+    /// # Errors
+    /// If the grains refuse the loads, which are laid anew.
+    pub fn open_angular_book(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
+        self.book_grains(simulation);
+        self.angular = Some(AngularBook::open(simulation));
+        self.lay(simulation)
+    }
+
+    /// Books the step that comes next.
+    pub fn see_step(&mut self, simulation: &Simulation) {
+        if let Some(book) = &mut self.angular {
+            book.see(simulation);
+        }
+    }
+
+    /// The account of angular momentum, if it is open.
+    pub fn angular_book(&self) -> Option<&AngularBook> {
+        self.angular.as_ref()
     }
 
     /// For how long what is laid has acted and is not booked yet (s).

@@ -3,6 +3,7 @@
 use super::Bowl;
 use super::zone::Side;
 use colluvium_dem::GrainSample;
+use nalgebra::Vector3;
 
 /// Part of a full cell's mass from which on it is bed.
 const FILLED: f64 = 0.5;
@@ -34,6 +35,28 @@ impl Bowl {
             }
         }
         sum
+    }
+
+    /// Granular temperature ⟨v′²⟩/3 about the mean velocity of the cells around each grain: of the buffer, of the inner overlap,
+    /// and of grains beyond it up to its width (m²/s²).
+    fn temperatures(&self) -> [f64; 3] {
+        let (cells, zone) = (&self.layout.cells, &self.layout.zone);
+        let [handshake, inner] = self.layout.widths;
+        let ends = [handshake, inner, 2.0 * inner - handshake];
+        let belongs = self.spec.belongs();
+        let mut sums = [[0.0; 2]; 3];
+        for grain in self.sighting.snapshot.grains.iter().filter(|g| belongs(g)) {
+            let label = zone.label(cells, &grain.position);
+            let Some(zone) = ends.iter().position(|end| label < *end) else {
+                continue;
+            };
+            let hats = cells.hats(&grain.position).into_iter();
+            let mean = hats.map(|(cell, hat)| hat * self.sums.cover[cell].velocity());
+            let about = grain.velocity - mean.sum::<Vector3<f64>>();
+            sums[zone][0] += grain.mass * about.norm_squared() / 3.0;
+            sums[zone][1] += grain.mass;
+        }
+        sums.map(|[energy, mass]| if mass > 0.0 { energy / mass } else { 0.0 })
     }
 
     /// Looks at both sides of the handshake surface, after a time (s).
@@ -78,7 +101,11 @@ impl Bowl {
             }
             *moved += side.outwards * self.sums.cover[inside].velocity()[side.axis] * dt;
         }
+        let temperatures = self.temperatures();
         let m = &mut self.monitors;
+        for (sum, temperature) in m.temperature.iter_mut().zip(temperatures) {
+            *sum += temperature;
+        }
         m.exchanges += 1.0;
         m.slip += slip;
         m.largest_slip = m.largest_slip.max(slip);

@@ -159,10 +159,16 @@ pub struct Monitors {
     pub newton: [f64; 2],
     /// Labels renewed.
     pub renewed: f64,
+    /// Σ of the granular temperature ⟨v′²⟩/3 of the buffer, of the inner overlap, and of as much of the grains beyond it
+    /// (m²/s²).
+    pub temperature: [f64; 3],
+    /// Work on the grains of the traction, of the impedance, and of the relaxation with what carries those that lie in the
+    /// continuum (J), by velocities when they are laid; negative where it takes energy from them.
+    pub work: [f64; 3],
 }
 
 /// Numbers of the monitors.
-pub const MONITORED: usize = 16;
+pub const MONITORED: usize = 22;
 
 impl Monitors {
     /// All of it in a row of numbers.
@@ -184,6 +190,12 @@ impl Monitors {
             self.newton[0],
             self.newton[1],
             self.renewed,
+            self.temperature[0],
+            self.temperature[1],
+            self.temperature[2],
+            self.work[0],
+            self.work[1],
+            self.work[2],
         ]
     }
 
@@ -202,6 +214,8 @@ impl Monitors {
             grain_steps: n[12],
             newton: [n[13], n[14]],
             renewed: n[15],
+            temperature: [n[16], n[17], n[18]],
+            work: [n[19], n[20], n[21]],
         }
     }
 
@@ -218,6 +232,11 @@ impl Monitors {
     /// Force of the grains over that of the continuum at the handshake surface.
     pub fn force_ratio(&self) -> f64 {
         self.force[0] / self.force[1]
+    }
+
+    /// Mean granular temperatures of the buffer, the inner overlap and the grains beyond it (m²/s²).
+    pub fn temperatures(&self) -> [f64; 3] {
+        self.temperature.map(|sum| sum / self.exchanges.max(1.0))
     }
 
     /// Mass of the grains in the overlap over that of the continuum there.

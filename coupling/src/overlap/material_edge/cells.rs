@@ -58,6 +58,11 @@ impl Cells {
         self.low + (column as f64 + 0.5) * self.spacing
     }
 
+    /// Height of the centres of the cells of a row (m).
+    pub fn height(&self, row: usize) -> f64 {
+        (row as f64 + 0.5) * self.spacing
+    }
+
     /// Cells between the centres of the first ones and a place along x.
     pub fn offset(&self, x: f64) -> f64 {
         (x - self.low) / self.spacing - 0.5

@@ -4,7 +4,9 @@ use super::cells::over;
 use super::embedded::Embedded;
 use super::rows::{Load, Row, bearers, slopes};
 use super::{MaterialEdge, OverlapError};
+use crate::overlap::angular::{AngularBook, Counterpart, Parts};
 use colluvium_dem::{GrainSample, Simulation};
+use nalgebra::Vector3;
 
 /// Cells with less of the mass of a full one are not spoken for by their grains.
 const LEAST_COVER: f64 = 0.3;
@@ -25,6 +27,11 @@ pub struct Scratch {
     loads: Vec<colluvium_dem::Load>,
 }
 
+/// A vector of the plane x–z in space.
+fn in_slab([x, z]: [f64; 2]) -> Vector3<f64> {
+    Vector3::new(x, 0.0, z)
+}
+
 impl MaterialEdge {
     /// What follows the steps of the grains for which loads are held: books what they gave, exchanges where it is
     /// time to, and lays the next loads.
@@ -39,19 +46,29 @@ impl MaterialEdge {
             self.made = 0;
             self.exchanges += 1;
             self.renew_labels();
+            let before = self
+                .angular
+                .is_some()
+                .then(|| simulation.leapfrog_angular_momentum());
             self.travel(simulation)?;
+            if let Some((book, before)) = self.angular.as_mut().zip(before) {
+                book.hand(&(simulation.leapfrog_angular_momentum() - before));
+            }
         }
         self.lay(simulation)
     }
 
     /// Books the impulses of what was laid over the steps made since.
-    fn book_grains(&mut self, simulation: &Simulation) {
+    pub(super) fn book_grains(&mut self, simulation: &Simulation) {
         self.monitors.grain_steps += simulation.grain_count() as f64 * self.steps_of_loads as f64;
         let time = self.acting(simulation);
         for (sum, force) in self.given.relaxation.iter_mut().zip(&self.laid.relaxation) {
             for (sum, force) in sum.iter_mut().zip(force) {
                 *sum += force * time;
             }
+        }
+        for (work, power) in self.monitors.work.iter_mut().zip(self.laid.powers) {
+            *work += power * time;
         }
         let gravity = simulation.gravity();
         let mass = self.grain_mass;
@@ -68,6 +85,21 @@ impl MaterialEdge {
     pub(super) fn lay(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
         self.laid_at = simulation.steps_done();
         self.laid.clear();
+        let mut angular = self.angular.take();
+        let laid = self.lay_noting(simulation, angular.as_mut());
+        self.angular = angular;
+        laid
+    }
+
+    /// Lays them, noting what they consist of.
+    fn lay_noting(
+        &mut self,
+        simulation: &mut Simulation,
+        mut angular: Option<&mut AngularBook>,
+    ) -> Result<(), OverlapError> {
+        if let Some(book) = &mut angular {
+            book.begin();
+        }
         if self.spec.settings.uncoupled {
             return Ok(());
         }
@@ -103,11 +135,14 @@ impl MaterialEdge {
                 load.weight += q * hat;
                 load.slip[0] += q * hat * (grain.velocity.x - u);
                 load.slip[1] += q * hat * (grain.velocity.z - w);
+                load.momentum[0] += q * hat * grain.velocity.x;
+                load.momentum[1] += q * hat * grain.velocity.z;
             }
         }
         let full = 0.5 * self.spec.density() * shell * self.cells.spacing * self.spec.slab;
         let least = LEAST_ROW * full;
         bearers(&scratch.shell, least, &mut scratch.bearers);
+        let mut pressed = Counterpart::default();
         scratch.forces.clear();
         scratch.forces.resize(rows, [0.0; 2]);
         for (k, row) in self.held.rows.iter().enumerate() {
@@ -118,7 +153,16 @@ impl MaterialEdge {
             let load = &scratch.shell[bearer];
             let slip = load.slip.map(|p| over(p, load.weight));
             let impedance = row.impedance(self.spec.settings.impedance, slip);
+            let force = [0, 1].map(|axis| row.traction[axis] + impedance[axis]);
+            pressed.add(
+                0,
+                &in_slab([row.place, self.cells.height(k)]),
+                &in_slab(force),
+            );
+            let velocity = load.momentum.map(|p| over(p, load.weight));
             for (axis, (traction, impedance)) in row.traction.iter().zip(impedance).enumerate() {
+                self.laid.powers[0] += traction * velocity[axis];
+                self.laid.powers[1] += impedance * velocity[axis];
                 scratch.forces[bearer][axis] += traction + impedance;
                 self.laid.traction[axis] += traction;
                 self.laid.impedance[axis] += impedance;
@@ -127,6 +171,7 @@ impl MaterialEdge {
         scratch.loads.clear();
         let gravity = simulation.gravity();
         let stopping = self.embedded_time();
+        let mut relaxation = 0.0;
         for (grain, label, embedded) in &scratch.near {
             let q = weight(grain, *label, embedded);
             let mut force = [0.0; 2];
@@ -140,8 +185,10 @@ impl MaterialEdge {
                     }
                 }
             }
+            let traction = force;
             let carried = embedded.force(grain, &gravity, stopping);
             let relaxed = if *label < buffer { grain.mass } else { 0.0 };
+            relaxation += carried.y * grain.velocity.y;
             for (cell, hat) in self.cells.hats(grain.position.x, grain.position.z) {
                 let laid = &mut self.laid.relaxation[cell];
                 for axis in 0..2 {
@@ -149,6 +196,7 @@ impl MaterialEdge {
                     let pull = hat * (relaxed + [carried.x, carried.z][axis]);
                     laid[axis] += pull;
                     force[axis] += pull;
+                    relaxation += pull * [grain.velocity.x, grain.velocity.z][axis];
                 }
             }
             if force != [0.0; 2] || carried.y != 0.0 {
@@ -157,7 +205,29 @@ impl MaterialEdge {
                     force: [force[0], carried.y, force[1]].into(),
                     moment: [0.0; 3].into(),
                 });
+                if let Some(book) = &mut angular {
+                    let all = Vector3::new(force[0], carried.y, force[1]);
+                    let traction = in_slab(traction);
+                    let parts = Parts {
+                        traction,
+                        relaxation: all - traction,
+                        ..Parts::default()
+                    };
+                    book.lay(grain.id, parts);
+                }
             }
+        }
+        self.laid.powers[2] = relaxation;
+        if let Some(book) = angular {
+            let columns = self.cells.counts[0];
+            for (cell, force) in self.laid.relaxation.iter().enumerate() {
+                let at = [
+                    self.cells.centre(cell % columns),
+                    self.cells.height(cell / columns),
+                ];
+                pressed.add(1, &in_slab(at), &in_slab(*force));
+            }
+            book.answered_by(pressed);
         }
         let laid = simulation.set_loads(&scratch.loads);
         self.scratch = scratch;

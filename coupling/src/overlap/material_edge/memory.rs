@@ -11,7 +11,7 @@ use colluvium_continuum::strain::SPACE_COMPONENTS;
 use colluvium_dem::{Patch, Simulation};
 
 /// Numbers in front but for the two rows of forces by cell, the account among them.
-const FRONT: usize = 12 + account::NUMBERS;
+const FRONT: usize = 18 + account::NUMBERS;
 
 impl MaterialEdge {
     /// What every load changes.
@@ -28,6 +28,8 @@ impl MaterialEdge {
             front.extend(given.traction);
             front.extend(given.impedance);
         }
+        front.extend(self.monitors.work);
+        front.extend(self.laid.powers);
         front.extend(self.account.numbers());
         front.extend(self.laid.relaxation.as_flattened());
         front.extend(self.given.relaxation.as_flattened());
@@ -166,7 +168,7 @@ impl MaterialEdge {
             && handshake.len() == edge.cells.counts[1]
             && edge.cells.count() == cells;
         let (scalars, forces) = front.split_at(FRONT);
-        let Ok(account) = scalars[12..].try_into() else {
+        let Ok(account) = scalars[18..].try_into() else {
             return Ok(None);
         };
         if !fits {
@@ -181,6 +183,7 @@ impl MaterialEdge {
         edge.owed = owed.as_chunks::<2>().0.to_vec();
         edge.monitors = Monitors::of(monitors);
         edge.monitors.grain_steps = scalars[3];
+        edge.monitors.work = [scalars[12], scalars[13], scalars[14]];
         edge.exchanges = exchanges as u64;
         edge.made = scalars[1] as u64;
         edge.laid_at = scalars[2] as u64;
@@ -191,6 +194,7 @@ impl MaterialEdge {
             let own = &forces[2 * cells * k..2 * cells * (k + 1)];
             given.relaxation = own.as_chunks::<2>().0.to_vec();
         }
+        edge.laid.powers = [scalars[15], scalars[16], scalars[17]];
         edge.account = Account::of(account);
         edge.weigh(simulation);
         edge.collapse.set_state(state)?;

@@ -44,6 +44,7 @@ pub use travel::{Move, Travel};
 pub use witness::{Through, Witness};
 
 use super::OverlapError;
+use super::angular::AngularBook;
 use super::rest_stress::RestStress;
 use super::settings::Resolved;
 use super::sighting::{Sighting, free_grains, free_mass};
@@ -132,6 +133,8 @@ struct Given {
     relaxation: Vec<[f64; 2]>,
     traction: [f64; 2],
     impedance: [f64; 2],
+    /// Powers of traction, impedance and relaxation when they were laid (W); of what is laid alone.
+    powers: [f64; 3],
 }
 
 impl Given {
@@ -144,7 +147,7 @@ impl Given {
 
     fn clear(&mut self) {
         self.relaxation.fill([0.0; 2]);
-        (self.traction, self.impedance) = ([0.0; 2], [0.0; 2]);
+        (self.traction, self.impedance, self.powers) = ([0.0; 2], [0.0; 2], [0.0; 3]);
     }
 }
 
@@ -181,6 +184,7 @@ pub struct MaterialEdge {
     sighting: Sighting,
     scratch: exchange::Scratch,
     outside: Outside,
+    angular: Option<AngularBook>,
 }
 
 impl MaterialEdge {
@@ -300,6 +304,7 @@ impl MaterialEdge {
             sighting: Sighting::default(),
             scratch: exchange::Scratch::default(),
             outside: Outside::nothing(cells.count()),
+            angular: None,
             spec,
         })
     }
@@ -363,6 +368,29 @@ impl MaterialEdge {
             account.weight[axis] += weight[axis] * time;
         }
         account
+    }
+
+    /// Books angular momentum about the slab's axis y from now on, for which [`see_step`](Self::see_step) has to be called before every step
+    /// of the grains; what is written does not hold the account.
+    ///
+    /// # Errors
+    /// If the grains refuse the loads, which are laid anew.
+    pub fn open_angular_book(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
+        self.book_grains(simulation);
+        self.angular = Some(AngularBook::open(simulation));
+        self.lay(simulation)
+    }
+
+    /// Books the step that comes next.
+    pub fn see_step(&mut self, simulation: &Simulation) {
+        if let Some(book) = &mut self.angular {
+            book.see(simulation);
+        }
+    }
+
+    /// The account of angular momentum, if it is open.
+    pub fn angular_book(&self) -> Option<&AngularBook> {
+        self.angular.as_ref()
     }
 
     /// For how long what is laid has acted and is not booked yet (s).

@@ -59,6 +59,8 @@ pub struct Load {
     pub weight: f64,
     /// Σ q h (v − u), u the continuum's velocity at the grain (N s).
     pub slip: [f64; 2],
+    /// Σ q h v (N s).
+    pub momentum: [f64; 2],
 }
 
 /// For each row the one whose grains bear what presses on it: itself, or the next below with grains, or above.

@@ -46,6 +46,29 @@ impl MaterialEdge {
         self.sighting.snapshot.grains.iter().filter(far).count()
     }
 
+    /// Granular temperature ⟨v′²⟩/3 about the mean velocity of the cells around each grain: of the buffer, of the inner overlap,
+    /// and of grains beyond it up to its width (m²/s²).
+    fn temperatures(&self) -> [f64; 3] {
+        let [handshake, inner] = self.spec.zones();
+        let ends = [handshake, inner, 2.0 * inner - handshake];
+        let mut sums = [[0.0; 2]; 3];
+        for grain in &self.sighting.snapshot.grains {
+            let label = self.labels.of(grain);
+            let Some(zone) = label.and_then(|label| ends.iter().position(|end| label < *end))
+            else {
+                continue;
+            };
+            let mut about = grain.velocity;
+            for (cell, hat) in self.cells.hats(grain.position.x, grain.position.z) {
+                let [u, w] = self.sums.cover[cell].velocity();
+                about -= hat * nalgebra::Vector3::new(u, 0.0, w);
+            }
+            sums[zone][0] += grain.mass * about.norm_squared() / 3.0;
+            sums[zone][1] += grain.mass;
+        }
+        sums.map(|[energy, mass]| over(energy, mass))
+    }
+
     /// Looks at both sides of the handshake surface.
     pub(super) fn watch(&mut self) {
         let columns = self.cells.counts[0];
@@ -87,6 +110,7 @@ impl MaterialEdge {
             }
         }
         let escaped = self.escaped() as f64;
+        let temperatures = self.temperatures();
         let m = &mut self.monitors;
         m.exchanges += 1.0;
         m.slip += slip;
@@ -95,5 +119,8 @@ impl MaterialEdge {
         m.force[1] += (pressed + leaning) * area;
         m.packing += over(packed, cells);
         m.escaped = m.escaped.max(escaped);
+        for (sum, temperature) in m.temperature.iter_mut().zip(temperatures) {
+            *sum += temperature;
+        }
     }
 }

@@ -1,5 +1,6 @@
 //! What a joined column has found, and its plan.
 
+use super::super::overlap_state;
 use super::JoinedColumn;
 use crate::failure::Failure;
 use crate::run::column_of_grains::{FLOOR, FRONT_SHARE, OF_SHARE, STILL_LOOKS};
@@ -349,6 +350,7 @@ impl JoinedColumn<'_> {
         ] {
             summary.put(name, Quantity::new(value, "N").from(source));
         }
+        overlap_state::put(monitors.temperatures(), monitors.work, summary);
         summary.put(
             "rest_ratio",
             Quantity::new(edge.rest_ratio(), "1")

@@ -1,5 +1,6 @@
 //! What a joined bed tells of its books and of its joint.
 
+use super::super::super::overlap_state;
 use super::super::super::world::Ran;
 use super::JoinedBed;
 use crate::summary::{Quantity, Summary};
@@ -125,6 +126,7 @@ impl JoinedBed<'_> {
         ] {
             summary.put(name, Quantity::new(value, "1").against(right, source));
         }
+        overlap_state::put(monitors.temperatures(), monitors.work, summary);
         summary.put(
             "newton_iterations",
             Quantity::new(monitors.iterations / monitors.steps[0], "1")

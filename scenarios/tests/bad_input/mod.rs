@@ -1,16 +1,12 @@
 //! Bad input: exit status 2, one message that names key, value and range, nothing written.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
-#[path = "../command/mod.rs"]
-mod command;
 mod command_line;
 mod continuum;
 mod grains;
 mod inclines;
 mod replaced_runs;
 
-use command::colluvium;
+use crate::command::colluvium;
 use std::fs;
 
 /// Arguments, and what the message has to contain.

@@ -1,7 +1,5 @@
 //! Clumps of grains against closed forms, conservation laws and the grains they are made of.
 
-#![allow(clippy::unwrap_used)]
-
 mod beds;
 mod changes;
 mod impacts;

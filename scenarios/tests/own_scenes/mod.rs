@@ -1,15 +1,11 @@
 //! Scenes of one's own: walls, boxes, fields and preparations as a file names them, against what is exact.
 
-#![allow(clippy::unwrap_used)] // a test may panic
-
 mod boundaries;
-#[path = "../command/mod.rs"]
-mod command;
 mod gravity;
 mod preparations;
 mod walls;
 
-use command::{Columns, succeed};
+use crate::command::{Columns, succeed};
 use std::path::Path;
 
 /// Writes a scene of these sections.

@@ -2,8 +2,7 @@
 //!
 //! Units: mean diameter, mean mass and gravity are 1; times are √(d/g).
 
-#![allow(clippy::unwrap_used)]
-
+mod angular;
 mod books;
 mod comparison;
 mod growth;
@@ -13,6 +12,7 @@ mod joined;
 mod loose;
 mod material;
 mod motion;
+mod patch_noise;
 mod pulse;
 mod rest;
 mod rest_pressure;

@@ -1,0 +1,21 @@
+//! Grains against exact solutions, conservation laws and independent figures.
+
+#![allow(clippy::unwrap_used)] // a test may panic
+
+mod bits;
+mod bodies;
+mod bonds;
+mod boundaries;
+mod cantilever;
+mod clumps;
+mod conversion;
+mod energy_ledger;
+mod gravity;
+mod impacts;
+mod law_bits;
+mod loads;
+mod malformed_records;
+mod patches;
+mod preparation;
+mod walls;
+mod world;

@@ -1,0 +1,30 @@
+//! Scenes, runs and the command line as a user meets them.
+
+#![allow(clippy::unwrap_used)] // a test may panic
+
+mod bad_input;
+mod beds;
+mod bodies;
+mod cliff;
+mod cliff_terrain;
+mod clumps;
+mod collapse;
+mod column_terrain;
+mod comet;
+mod command;
+mod cylinder;
+mod cylinder_of_grains;
+mod full_disk;
+mod grains;
+mod joined_bed;
+mod joined_cliff;
+mod joined_column;
+mod joined_incline;
+mod killed;
+mod malformed;
+mod open_chute;
+mod own_scenes;
+mod restart;
+mod scenes;
+mod tumbling_box;
+mod worlds;
