@@ -3,7 +3,6 @@
 //! The reference material (μ_s 0.32, Δμ 0.28, I_0 0.4, d = 0.04 H, slope 0.43 rad, φ = 1) is the one
 //! of the Basilisk test case; Basilisk C 25-02-26 on a fixed flat surface has relative L2 errors
 //! 7.22e-3, 1.97e-3, 5.21e-4, 1.39e-4 at 16, 32, 64, 128 cells (own measurement).
-// A helper of a test may panic like the test itself.
 use std::ops::ControlFlow;
 
 use colluvium_continuum::Error;

@@ -1,7 +1,5 @@
 //! How far matter at rest creeps: by the strain-rate floor ε of the solver and no more under μ(I), by itself under the
 //! regularised law of Barker and Gray.
-// A helper of a test may panic like the test itself.
-#![allow(clippy::unwrap_used)]
 
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
 use colluvium_continuum::free_surface::plane::Plane;

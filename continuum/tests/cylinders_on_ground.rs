@@ -1,5 +1,4 @@
 //! Cylinders that collapse over ground: volume, symmetry, rest.
-// A helper of a test may panic like the test itself.
 use colluvium_continuum::cylinder_collapse::{CylinderCase, CylinderCollapse, CylinderGround};
 use colluvium_continuum::free_surface::{Contact, SurfaceOptions};
 use colluvium_continuum::rheology::MuI;

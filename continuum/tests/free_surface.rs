@@ -1,6 +1,5 @@
 //! Material with a moving free surface against exact solutions: rest, free fall, Bagnold flow with
 //! the surface inside a cell, standing waves.
-// A helper of a test may panic like the test itself.
 use std::f64::consts::PI;
 
 use colluvium_continuum::free_surface::plane::Plane;

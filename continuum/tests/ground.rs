@@ -1,5 +1,4 @@
 //! Material over ground that cuts the cells: rest, Bagnold flow on inclines, collapses.
-// A helper of a test may panic like the test itself.
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase, CollapseGround};
 use colluvium_continuum::free_surface::{Contact, SurfaceFlow, SurfaceOptions, Terrain};
 use colluvium_continuum::grid::{Axis, Boundary, Grid};

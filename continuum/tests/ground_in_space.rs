@@ -1,6 +1,5 @@
 //! Material over ground that cuts the cells of a grid in space: rest, Bagnold flow on inclines of any direction, blocks,
 //! collapses.
-// A helper of a test may panic like the test itself.
 use colluvium_continuum::free_surface::{Contact, SpaceFlow, SurfaceFlow, SurfaceOptions, Terrain};
 use colluvium_continuum::grid::{Axis, Boundary, Grid};
 use colluvium_continuum::rheology::MuI;

@@ -1,6 +1,5 @@
 //! What makes solvers of yield-stress flow fail: contrasts of viscosity, pressure that vanishes, time
 //! steps of any size.
-// A helper of a test may panic like the test itself.
 use std::ops::ControlFlow;
 
 use colluvium_continuum::bagnold::BagnoldCase;

@@ -1,5 +1,4 @@
 //! The family of laws on an incline and in a chute, against their exact profiles.
-// A helper of a test may panic like the test itself.
 use std::ops::ControlFlow;
 
 use colluvium_continuum::bagnold::BagnoldCase;

@@ -5,7 +5,6 @@
 //! fixed rough wall and one that moves at U and gives way normally, under the normal stress of the
 //! solution; p = 1 + 0.3 sin(kx + 1) cos(2z). The inertial number runs from 0.08 to 0.3, inside the
 //! well-posed window.
-// A helper of a test may panic like the test itself.
 use std::f64::consts::TAU;
 
 use colluvium_continuum::discretisation::{Discretisation, ThresholdPressure};

@@ -1,5 +1,4 @@
 //! Flows whose linear systems are solved with multigrid against the same ones with factors.
-// A helper of a test may panic like the test itself.
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
 use colluvium_continuum::cylinder_collapse::{CylinderCase, CylinderCollapse};
 use colluvium_continuum::free_surface::{Contact, SpaceFlow, SurfaceOptions};

@@ -1,5 +1,4 @@
 //! Flow that enters at one end and leaves at the other.
-// A helper of a test may panic like the test itself.
 use colluvium_continuum::free_surface::{Inflow, SurfaceFlow, SurfaceOptions, SurfaceState};
 use colluvium_continuum::grid::{Axis, Boundary, Grid};
 use colluvium_continuum::rheology::MuI;

@@ -1,5 +1,4 @@
 //! Plane shear and the vertical chute against their exact solutions.
-// A helper of a test may panic like the test itself.
 use std::ops::ControlFlow;
 
 use colluvium_continuum::flow::YieldMethod;

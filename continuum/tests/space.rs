@@ -1,6 +1,5 @@
 //! Flow in space against exact solutions and against the plane solver: rest, Bagnold flow along any
 //! direction, plane flow along any axis, the collapse of a cylinder.
-// A helper of a test may panic like the test itself.
 use colluvium_continuum::cylinder_collapse::{CylinderCase, CylinderCollapse};
 use colluvium_continuum::free_surface::plane::Plane;
 use colluvium_continuum::free_surface::{Contact, SpaceFlow, SurfaceFlow, SurfaceOptions};

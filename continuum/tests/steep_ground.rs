@@ -1,7 +1,6 @@
 //! Ground on which Newton's method is hard put to it: films on steep slopes, valleys, slopes without friction.
 //! Cells let go and are seized in turn there, and friction under the pressure at the end of a step can leave
 //! no solution at all. All but one of 35 runs go to their end with their volume; no step is accepted that has not converged.
-// A helper of a test may panic like the test itself.
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase, CollapseGround};
 use colluvium_continuum::free_surface::{Contact, SurfaceOptions};
 use colluvium_continuum::rheology::MuI;

@@ -1,5 +1,4 @@
 //! Cells cut by ground: volumes, faces and walls of shapes whose cuts are known.
-// A helper of a test may panic like the test itself.
 use colluvium_continuum::terrain::{CutCells, GridLines, HeightRaster, Profile, Surface};
 
 fn plane_grid(cells: [usize; 2], length: [f64; 2]) -> GridLines<2> {

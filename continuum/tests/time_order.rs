@@ -1,5 +1,4 @@
 //! Order in time of a flow with a moving surface, on grids that stay the same.
-// A helper of a test may panic like the test itself.
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
 use colluvium_continuum::free_surface::{SurfaceFlow, SurfaceOptions};
 use colluvium_continuum::grid::{Axis, Boundary, Grid};

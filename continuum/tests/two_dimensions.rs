@@ -1,6 +1,5 @@
 //! Flows that fill two dimensions: the grid has no preferred axis, and matter in a tilted box rests
 //! or flows as it should.
-// A helper of a test may panic like the test itself.
 use colluvium_continuum::discretisation::ThresholdPressure;
 use colluvium_continuum::flow::{Flow, YieldMethod};
 use colluvium_continuum::grid::{Axis, Boundary, Grid};

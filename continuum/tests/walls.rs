@@ -1,5 +1,4 @@
 //! Walls on which material slides: a slab on a base, shear with slip, a heap between side walls.
-// A helper of a test may panic like the test itself.
 use std::ops::ControlFlow;
 
 use colluvium_continuum::discretisation::{Discretisation, ThresholdPressure};

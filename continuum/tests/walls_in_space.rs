@@ -1,6 +1,5 @@
 //! Walls along which material slides, in space: a slab on a floor and between side walls, and the collapse of a
 //! column in a channel beside the plane solver.
-// A helper of a test may panic like the test itself.
 use colluvium_continuum::channel_collapse::{ChannelCase, ChannelCollapse};
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
 use colluvium_continuum::free_surface::{Contact, SpaceFlow, SurfaceOptions};

@@ -1,5 +1,4 @@
 //! Growth of short waves: the bare μ(I) law against the exact dispersion relation, and its cure.
-// A helper of a test may panic like the test itself.
 use colluvium_continuum::plane_wave::{PlaneWave, PlaneWaveCase};
 use colluvium_continuum::rheology::{BarkerGray, Coulomb, MuI, Rheology, ShearLaw};
 

@@ -1,6 +1,5 @@
 //! Fields at points against balance laws and exact fields.
 
-// A helper of a test may panic like the test itself.
 use colluvium_coupling::coarse_graining::{
     Balance, Cells, Geometry, Mesh, PointFields, PointSums, Shape, Smoothing, solid_fractions,
 };

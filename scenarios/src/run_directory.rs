@@ -33,7 +33,7 @@ pub const LOG: &str = "log.txt";
 pub const ANIMATION: &str = "animation.gif";
 
 /// Every file that a run, a campaign or a comparison writes.
-const OWN_FILES: [&str; 47] = [
+const OWN_FILES: [&str; 53] = [
     ANIMATION,
     SCENE,
     REPORT,
@@ -45,6 +45,12 @@ const OWN_FILES: [&str; 47] = [
     LOG,
     "grains.vtkhdf",
     "contacts.vtkhdf",
+    "fields.vtkhdf",
+    "continuum.vtkhdf",
+    "bodies.vtkhdf",
+    "clumps.vtkhdf",
+    "fields.csv",
+    "posterior.csv",
     "profile.csv",
     "energy.csv",
     "trajectory.csv",
@@ -335,6 +341,7 @@ fn outermost_missing(path: &Path) -> Option<PathBuf> {
 fn remove_old_run(path: &Path) -> std::io::Result<()> {
     let numbered = |name: &String| {
         (name.starts_with("profile_") && name.ends_with(".csv"))
+            || (name.starts_with("fields_species_") && name.ends_with(".csv"))
             || (name.starts_with("view_") && name.ends_with(".png"))
             || (name.starts_with("wall_") && name.ends_with(".vtu"))
     };

@@ -272,8 +272,9 @@ fn backwards<L: Lanes, const W: usize>(panel: &[f32], local: &mut [f64]) {
     }
     for j in (0..W).rev() {
         let mut value = own[j] * f64::from(triangle[j * WIDTH + j]) - sums[j].sum();
-        for i in j + 1..W {
-            value -= f64::from(triangle[j * WIDTH + i]) * own[i];
+        let row = &triangle[j * WIDTH..j * WIDTH + W];
+        for (factor, later) in row.iter().zip(own.iter()).skip(j + 1) {
+            value -= f64::from(*factor) * later;
         }
         own[j] = value;
     }

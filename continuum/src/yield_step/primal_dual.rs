@@ -361,13 +361,16 @@ impl<const C: usize> PrimalDual<C> {
                 return;
             }
             let left = report.residuals.over(&allowed);
-            if !is_last_floor || iteration == 0 {
+            let left = left.max(report.residuals.divergence / allowed.divergence);
+            let falls = !is_last_floor && fraction >= 0.5;
+            if falls || iteration == 0 {
                 // What changes on the way down is no conflict yet,
                 left_when_counting = left;
                 self.conflicts.begin();
             } else if self.conflicts.is_cycling() {
                 // nor is what changes while the rest converges.
-                if left > PROGRESS * left_when_counting {
+                let converges = left <= PROGRESS * left_when_counting;
+                if !converges {
                     return;
                 }
                 left_when_counting = left;

@@ -371,7 +371,7 @@ pub(super) fn describe_rest<const D: usize, const C: usize>(
     summary.remarks.push(format!(
         "This law has no yield stress, so every slope of the deposit creeps for ever: at the end of the run its fastest \
          material moves with {speed:.2e} m/s, {:.1e} √(gravity height), and its top falls with {fall:.2e} m/s, {:.1e} \
-         √(gravity height). The solver's floor of the strain rate lets rigid matter creep at {:.1e} m/s by itself.",
+         √(gravity height). Under a law with a yield stress all below {:.1e} m/s would count as at rest.",
         speed / unit,
         fall / unit,
         deposit.rest_speed

@@ -51,9 +51,15 @@ impl OverlapWidth {
         }
         let least = LEAST * diameter;
         if width < least || width >= room {
-            let range = format!(
-                "[{least:.4}, {room:.4}) m: from two mean diameters up to what leaves room for continuum and grains beside it"
-            );
+            let range = if room > least && room.is_finite() {
+                format!(
+                    "[{least:.4}, {room:.4}) m: from two mean diameters up to what leaves room for continuum and grains beside it"
+                )
+            } else {
+                format!(
+                    "at least two mean diameters, {least:.4} m, where there is room for that much"
+                )
+            };
             return Err(at.refuse("width", width, range));
         }
         Ok(())

@@ -14,11 +14,16 @@ fn a_run_of_ours_may_be_replaced_and_nothing_else() {
     };
     assert!(run("a/b").status.success());
     fs::write(folder.path().join("a/b/notes.md"), "mine").unwrap();
-    // A table of another kind of run would pass for one of the new run.
-    fs::write(folder.path().join("a/b/front.csv"), "t,x_front\n").unwrap();
+    // A table or a series of another kind of run would pass for one of the new run.
+    let foreign = ["front.csv", "continuum.vtkhdf", "fields_species_1.csv"];
+    for name in foreign {
+        fs::write(folder.path().join("a/b").join(name), "old").unwrap();
+    }
     assert!(run("a/b").status.success());
     assert!(folder.path().join("a/b/notes.md").exists());
-    assert!(!folder.path().join("a/b/front.csv").exists());
+    for name in foreign {
+        assert!(!folder.path().join("a/b").join(name).exists(), "{name}");
+    }
     assert_eq!(run("a").status.code(), Some(2));
 }
 

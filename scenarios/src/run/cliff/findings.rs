@@ -64,6 +64,9 @@ impl CliffScene {
             "1",
             "in the crack, that lost their cohesion",
         );
+        // That it barely stands is said of these grains only.
+        let is_of_their_grains =
+            self.grains_of_the_paper() == Some(self.material.smallest_diameter);
         let fall = (2.0 * (self.shape.height - self.shape.wall) / self.gravity).sqrt();
         let free = format!(
             "the same, of the largest kinetic energy; a free fall from the top takes {fall:.0} s"
@@ -95,7 +98,12 @@ impl CliffScene {
             ),
         ] {
             let quantity = Quantity::new(value, unit);
-            summary.put(name, self.beside_cliffs(quantity, source, reference, said));
+            let quantity = if name == "stood" && !is_of_their_grains {
+                quantity.from(source)
+            } else {
+                self.beside_cliffs(quantity, source, reference, said)
+            };
+            summary.put(name, quantity);
         }
         let grains = Quantity::new(self.material.smallest_diameter, "m");
         let source = "of the material; it is to stand barely";
