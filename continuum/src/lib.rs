@@ -59,6 +59,7 @@ pub mod plane_wave;
 pub mod rheology;
 pub mod strain;
 pub mod terrain;
+mod threads;
 pub mod units;
 pub mod vertical_chute;
 pub mod wall_friction;

@@ -28,6 +28,8 @@ mod multigrid;
 mod panels;
 mod pattern;
 mod product;
+mod subtrees;
+mod supernodal;
 
 use std::time::Instant;
 
@@ -35,7 +37,7 @@ use faer::sparse::SymbolicSparseColMat;
 
 use crate::error::Error;
 pub use dissection::Place;
-use dissection::dissect;
+use dissection::{Pieces, dissect};
 use gmres::{Gmres, Goal};
 use ldlt::QuasiDefinite;
 use lu::Lu;
@@ -99,7 +101,7 @@ struct Iterative {
     factors: Option<QuasiDefinite>,
     krylov: Krylov,
     diagonal: Vec<u32>,
-    order: Option<Vec<usize>>,
+    order: Option<(Vec<usize>, Pieces)>,
 }
 
 /// Which factors belong to the present coefficients.

@@ -18,32 +18,42 @@ use faer::sparse::linalg::cholesky::{
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 
+use super::dissection::Pieces;
 use super::panels::Panels;
+use super::subtrees::Subtree;
+use super::supernodal::{Bench, Factorisation, Layout, SMALLEST_PIVOT};
 use crate::error::Error;
 
 /// LDLᵀ factors of the lower triangle of a matrix of fixed pattern, with −δ on the diagonal of the
 /// second block.
 pub(super) struct QuasiDefinite {
-    symbolic: SymbolicCholesky<usize>,
+    kind: Kind,
     factors: Vec<f64>,
-    /// The factors in single precision, where they are used so.
-    panels: Option<Panels>,
     values: Vec<f64>,
     diagonal: Vec<u32>,
-    signs: Vec<i8>,
     definite: usize,
     regularisation: f64,
-    scratch: MemBuffer,
-    /// A right-hand side in the order of the factors.
-    ordered: Vec<f64>,
+}
+
+enum Kind {
+    Tight {
+        symbolic: SymbolicCholesky<usize>,
+        signs: Vec<i8>,
+        scratch: MemBuffer,
+    },
+    /// Used in single precision.
+    Loose {
+        symbolic: SymbolicCholesky<usize>,
+        layout: Layout,
+        tree: Subtree,
+        bench: Bench,
+        panels: Panels,
+    },
 }
 
 /// Supernodes are merged up to so many columns while zeros are less than this part of them. Substitution reads zeros,
 /// too: with faer's own choice factors of plane flows are a tenth larger.
 const MERGED: [(usize, f64); 3] = [(4, 0.5), (16, 0.2), (48, 0.05)];
-
-/// Pivots smaller than this, or of the wrong sign by round-off, are replaced by it.
-const SMALLEST_PIVOT: f64 = 1e-14;
 
 impl QuasiDefinite {
     pub(super) fn new(
@@ -51,9 +61,10 @@ impl QuasiDefinite {
         definite: usize,
         regularisation: f64,
         diagonal: Vec<u32>,
-        order: Option<Vec<usize>>,
+        order: Option<(Vec<usize>, Pieces)>,
         loose: bool,
     ) -> Result<Self, Error> {
+        let (order, pieces) = order.unzip();
         let order = order.map(|forward| {
             let mut back = vec![0; forward.len()];
             for (place, &unknown) in forward.iter().enumerate() {
@@ -75,28 +86,40 @@ impl QuasiDefinite {
         }
         let symbolic = factorize_symbolic_cholesky(pattern, Side::Lower, ordering, parameters)
             .map_err(|e| Error::LinearSolver(format!("{e:?}")))?;
-        let need = symbolic
-            .factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default())
-            .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
-        let scratch = MemBuffer::try_new(need)
-            .map_err(|_| Error::LinearSolver("out of memory".to_owned()))?;
-        let panels = match symbolic.raw() {
-            SymbolicCholeskyRaw::Supernodal(supernodes) if loose => Some(Panels::new(supernodes)),
-            _ => None,
+        let factors = vec![0.0; symbolic.len_val()];
+        let sign = |unknown: usize| if unknown < definite { 1 } else { -1 };
+        let kind = match (symbolic.raw(), symbolic.perm()) {
+            (SymbolicCholeskyRaw::Supernodal(supernodes), Some(order)) if loose => {
+                let tree = Subtree::new(supernodes, pieces.as_ref());
+                let panels = Panels::new(supernodes, &tree, order.arrays().0);
+                let layout = Layout::new(pattern, order, supernodes, sign);
+                Kind::Loose {
+                    bench: Bench::new(supernodes, &layout, &tree),
+                    layout,
+                    tree,
+                    panels,
+                    symbolic,
+                }
+            }
+            _ => {
+                let need = symbolic
+                    .factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default())
+                    .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
+                Kind::Tight {
+                    signs: (0..diagonal.len()).map(sign).collect(),
+                    scratch: MemBuffer::try_new(need)
+                        .map_err(|_| Error::LinearSolver("out of memory".to_owned()))?,
+                    symbolic,
+                }
+            }
         };
         Ok(Self {
-            factors: vec![0.0; symbolic.len_val()],
-            panels,
-            symbolic,
+            kind,
+            factors,
             values: vec![0.0; pattern.row_idx().len()],
-            signs: (0..diagonal.len())
-                .map(|i| if i < definite { 1 } else { -1 })
-                .collect(),
             diagonal,
             definite,
             regularisation,
-            scratch,
-            ordered: vec![0.0; pattern.nrows()],
         })
     }
 
@@ -109,49 +132,63 @@ impl QuasiDefinite {
         for &slot in &self.diagonal[self.definite..] {
             self.values[slot as usize] -= self.regularisation;
         }
-        self.symbolic
-            .factorize_numeric_ldlt(
-                &mut self.factors,
-                SparseColMatRef::new(pattern, &self.values),
-                Side::Lower,
-                LdltRegularization {
-                    dynamic_regularization_signs: Some(&self.signs),
-                    dynamic_regularization_delta: SMALLEST_PIVOT,
-                    dynamic_regularization_epsilon: SMALLEST_PIVOT,
-                },
-                Par::Seq,
-                MemStack::new(&mut self.scratch),
-                Default::default(),
-            )
-            .map_err(|e| Error::LinearSolver(format!("{e:?}")))?;
-        if let (SymbolicCholeskyRaw::Supernodal(supernodes), Some(panels)) =
-            (self.symbolic.raw(), &mut self.panels)
-        {
-            panels.load(supernodes, &self.factors);
+        match &mut self.kind {
+            Kind::Tight {
+                symbolic,
+                signs,
+                scratch,
+            } => symbolic
+                .factorize_numeric_ldlt(
+                    &mut self.factors,
+                    SparseColMatRef::new(pattern, &self.values),
+                    Side::Lower,
+                    LdltRegularization {
+                        dynamic_regularization_signs: Some(signs),
+                        dynamic_regularization_delta: SMALLEST_PIVOT,
+                        dynamic_regularization_epsilon: SMALLEST_PIVOT,
+                    },
+                    Par::Seq,
+                    MemStack::new(scratch),
+                    Default::default(),
+                )
+                .map(|_| ())
+                .map_err(|e| Error::LinearSolver(format!("{e:?}"))),
+            Kind::Loose {
+                symbolic,
+                layout,
+                tree,
+                bench,
+                panels,
+            } => {
+                let SymbolicCholeskyRaw::Supernodal(symbolic) = symbolic.raw() else {
+                    return Err(Error::LinearSolver("no supernodes".to_owned()));
+                };
+                let work = Factorisation {
+                    symbolic,
+                    layout,
+                    values: &self.values,
+                };
+                work.factorise(tree, &mut self.factors, bench, panels)
+            }
         }
-        Ok(())
     }
 
     /// Overwrites x with S⁻¹ x; there must be factors.
     pub(super) fn solve(&mut self, x: &mut [f64]) {
-        if let (Some(order), Some(panels)) = (self.symbolic.perm(), &mut self.panels) {
-            let (forward, _) = order.arrays();
-            for (y, &from) in self.ordered.iter_mut().zip(forward) {
-                *y = x[from];
+        match &mut self.kind {
+            Kind::Tight {
+                symbolic, scratch, ..
+            } => {
+                let rows = x.len();
+                LdltRef::new(symbolic, &self.factors).solve_in_place_with_conj(
+                    Conj::No,
+                    MatMut::from_column_major_slice_mut(x, rows, 1),
+                    Par::Seq,
+                    MemStack::new(scratch),
+                );
             }
-            panels.substitute(&mut self.ordered);
-            for (y, &to) in self.ordered.iter().zip(forward) {
-                x[to] = *y;
-            }
-            return;
+            Kind::Loose { panels, .. } => panels.substitute(x),
         }
-        let rows = x.len();
-        LdltRef::new(&self.symbolic, &self.factors).solve_in_place_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(x, rows, 1),
-            Par::Seq,
-            MemStack::new(&mut self.scratch),
-        );
     }
 }
 
@@ -209,7 +246,7 @@ mod tests {
     fn panels_solve_the_system_to_single_precision() {
         for side in [2, 7, 19] {
             let (mut factors, expected, dense) = membrane(side);
-            assert!(factors.panels.is_some());
+            assert!(matches!(factors.kind, Kind::Loose { .. }));
             let product = |row: &Vec<f64>| row.iter().zip(&expected).map(|(a, x)| a * x).sum();
             let mut x: Vec<f64> = dense.iter().map(product).collect();
             factors.solve(&mut x);
@@ -223,10 +260,12 @@ mod tests {
     #[test]
     fn every_processor_gives_the_same_bits() {
         let (mut factors, start, _) = membrane(19);
-        let panels = factors.panels.as_mut().unwrap();
+        let Kind::Loose { panels, .. } = &mut factors.kind else {
+            panic!("not in panels");
+        };
         let (mut fast, mut plain) = (start.clone(), start);
         panels.substitute(&mut fast);
-        panels.substitute_by::<crate::linear_solver::lanes::Plain>(&mut plain);
+        panels.substitute_plainly(&mut plain);
         assert!(
             fast.iter()
                 .zip(&plain)
