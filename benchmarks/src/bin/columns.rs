@@ -294,7 +294,10 @@ fn print_cost(column: &Column, cells: usize, run: &Run) {
         evaluation,
     ];
     println!("| {} |", phases.map(|part| share(part, whole)).join(" | "));
-    println!("| {} |", phases.map(|part| format!("{part:.2} s")).join(" | "));
+    println!(
+        "| {} |",
+        phases.map(|part| format!("{part:.2} s")).join(" | ")
+    );
 }
 
 fn print_fronts(

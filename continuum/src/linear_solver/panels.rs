@@ -106,7 +106,11 @@ impl Panels {
         }
         outside.sort_unstable();
         outside.dedup();
-        for (place, row) in own.clone().chain(outside.iter().map(|&r| r as usize)).enumerate() {
+        for (place, row) in own
+            .clone()
+            .chain(outside.iter().map(|&r| r as usize))
+            .enumerate()
+        {
             places[row] = place as u32;
         }
         let to_places = |rows: &mut [u32]| {

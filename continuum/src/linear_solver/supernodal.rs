@@ -13,9 +13,9 @@ use faer::linalg::cholesky::ldlt::factor::{
 use faer::linalg::matmul::matmul;
 use faer::linalg::triangular_solve::solve_unit_lower_triangular_in_place;
 use faer::perm::PermRef;
+use faer::prelude::{Reborrow, ReborrowMut};
 use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
-use faer::prelude::{Reborrow, ReborrowMut};
 use faer::{Accum, MatMut, MatRef, Par};
 
 use super::panels::Panels;
@@ -242,12 +242,7 @@ struct Target<'a> {
 
 impl Target<'_> {
     /// Takes the contributions.
-    fn update(
-        &self,
-        updates: &[Update],
-        own: &mut [f64],
-        strands: &mut [Strand; 2],
-    ) {
+    fn update(&self, updates: &[Update], own: &mut [f64], strands: &mut [Strand; 2]) {
         let blocks = own.len().div_ceil(BLOCK * self.height);
         let half = |own: &mut [f64], first: usize, strand: &mut Strand| {
             for (n, block) in own.chunks_mut(BLOCK * self.height).enumerate() {
@@ -264,13 +259,7 @@ impl Target<'_> {
     }
 
     /// Takes the contributions to a block of columns, the first of which is number `first`.
-    fn update_block(
-        &self,
-        updates: &[Update],
-        own: &mut [f64],
-        first: usize,
-        strand: &mut Strand,
-    ) {
+    fn update_block(&self, updates: &[Update], own: &mut [f64], first: usize, strand: &mut Strand) {
         let symbolic = self.work.symbolic;
         let first = self.begin + first;
         let rows_of_block = first..first + own.len() / self.height;
@@ -301,7 +290,12 @@ impl Target<'_> {
                 continue;
             }
             let factors_of = |rows: usize| {
-                MatRef::from_column_major_slice_with_stride(&factors[width + from..], rows, width, height)
+                MatRef::from_column_major_slice_with_stride(
+                    &factors[width + from..],
+                    rows,
+                    width,
+                    height,
+                )
             };
             let scaled = &mut strand.scaled[..count * width];
             for (n, scaled) in scaled.chunks_exact_mut(width).enumerate() {
@@ -492,9 +486,10 @@ impl Bench {
         layout: &Layout,
         tree: &Subtree,
     ) -> Self {
-        let halves = tree.halves.as_ref().map(|halves| {
-            Box::new([0, 1].map(|n| Self::new(symbolic, layout, &halves[n])))
-        });
+        let halves = tree
+            .halves
+            .as_ref()
+            .map(|halves| Box::new([0, 1].map(|n| Self::new(symbolic, layout, &halves[n]))));
         let (mut product, mut scaled) = (0, BLOCK * BLOCK);
         for s in tree.own() {
             let width = columns(symbolic, s).len();

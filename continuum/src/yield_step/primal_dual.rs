@@ -29,7 +29,8 @@ use super::{
 use crate::discretisation::{COMPONENTS, Discretisation};
 use crate::error::Error;
 use crate::rheology::{Rheology, squared_norm, strain_rate_norm};
-use evaluation::Evaluation;
+use crate::threads;
+use evaluation::{Evaluation, POINTS};
 use part::Outcome;
 
 /// Settings of [`PrimalDual`]; times and lengths in natural units.
@@ -142,6 +143,28 @@ impl<const C: usize> Default for LinearisedPoint<C> {
             stress: [0.0; C],
             by_rate: [[0.0; C]; C],
             by_pressure: [0.0; C],
+        }
+    }
+}
+
+impl<const C: usize> LinearisedPoint<C> {
+    fn set(&mut self, evaluation: &Evaluation<C>, s: &[f64; C]) {
+        let Evaluation {
+            gamma,
+            rate,
+            threshold,
+            ..
+        } = evaluation;
+        let viscosity = threshold.stress / rate;
+        let inverse_square = 1.0 / (rate * rate);
+        for a in 0..C {
+            self.stress[a] = viscosity * gamma[a];
+            self.by_pressure[a] = threshold.by_pressure * gamma[a] / rate;
+            for b in 0..C {
+                self.by_rate[a][b] =
+                    (threshold.by_rate * gamma[a] - s[a]) * gamma[b] * inverse_square;
+            }
+            self.by_rate[a][a] += viscosity;
         }
     }
 }
@@ -400,26 +423,15 @@ impl<const C: usize> PrimalDual<C> {
         floor: f64,
     ) {
         self.evaluate(problem, floor);
-        let states = self.evaluations.iter().zip(&self.trial.s);
-        for (q, (linear, (evaluation, s))) in self.points.iter_mut().zip(states).enumerate() {
-            let Evaluation {
-                gamma,
-                rate,
-                threshold,
-                is_pressed,
-            } = *evaluation;
-            self.conflicts.note_point(q, is_pressed);
-            let viscosity = threshold.stress / rate;
-            let inverse_square = 1.0 / (rate * rate);
-            for a in 0..C {
-                linear.stress[a] = viscosity * gamma[a];
-                linear.by_pressure[a] = threshold.by_pressure * gamma[a] / rate;
-                for b in 0..C {
-                    linear.by_rate[a][b] =
-                        (threshold.by_rate * gamma[a] - s[a]) * gamma[b] * inverse_square;
-                }
-                linear.by_rate[a][a] += viscosity;
+        let (evaluations, stresses) = (&self.evaluations, &self.trial.s);
+        threads::over(&mut self.points, POINTS, &|first, points| {
+            let states = evaluations[first..].iter().zip(&stresses[first..]);
+            for (linear, (evaluation, s)) in points.iter_mut().zip(states) {
+                linear.set(evaluation, s);
             }
+        });
+        for (q, evaluation) in self.evaluations.iter().enumerate() {
+            self.conflicts.note_point(q, evaluation.is_pressed);
         }
     }
 
@@ -431,42 +443,49 @@ impl<const C: usize> PrimalDual<C> {
         u_old: &[f64],
     ) {
         let discretisation = problem.discretisation;
-        let linear = &self.points;
-        self.matrix
-            .fill(discretisation, problem.dt, &self.released, |q| {
-                let by_rate = &linear[q].by_rate;
-                let c = std::array::from_fn(|a| {
-                    std::array::from_fn(|b| 0.5 * (by_rate[a][b] + by_rate[b][a]))
+        let (linear, trial, released) = (&self.points, &self.trial, &self.released);
+        let (matrix, right_hand_side) = (&mut self.matrix, &mut self.right_hand_side);
+        threads::join(
+            linear.len() > POINTS,
+            || {
+                matrix.fill(discretisation, problem.dt, released, |q| {
+                    let by_rate = &linear[q].by_rate;
+                    let c = std::array::from_fn(|a| {
+                        std::array::from_fn(|b| 0.5 * (by_rate[a][b] + by_rate[b][a]))
+                    });
+                    (c, linear[q].by_pressure)
                 });
-                (c, linear[q].by_pressure)
-            });
-        let velocities = discretisation.velocities();
-        let (momentum, continuity) = self.right_hand_side.split_at_mut(velocities);
-        let mass = discretisation.mass();
-        for (j, r) in momentum.iter_mut().enumerate() {
-            *r = problem.load[j] - mass[j] * (self.trial.u[j] - u_old[j]) / problem.dt;
-        }
-        for (point, linear) in discretisation.points().iter().zip(&self.points) {
-            for (slot, &j) in point.velocities().iter().enumerate() {
-                momentum[j] -= point.weight * point.force(slot, &linear.stress);
-            }
-        }
-        let forces = discretisation
-            .divergence()
-            .iter()
-            .zip(discretisation.gradient());
-        for (&(cell, j, _), force) in forces {
-            momentum[j] += force * self.trial.p[cell];
-        }
-        let volume = discretisation.grid().cell_volume();
-        for ((r, p), _) in continuity
-            .iter_mut()
-            .zip(&self.trial.p)
-            .zip(&self.released)
-            .filter(|(_, released)| **released)
-        {
-            *r = volume * p;
-        }
+            },
+            || {
+                let velocities = discretisation.velocities();
+                let (momentum, continuity) = right_hand_side.split_at_mut(velocities);
+                let mass = discretisation.mass();
+                for (j, r) in momentum.iter_mut().enumerate() {
+                    *r = problem.load[j] - mass[j] * (trial.u[j] - u_old[j]) / problem.dt;
+                }
+                for (point, linear) in discretisation.points().iter().zip(linear) {
+                    for (slot, &j) in point.velocities().iter().enumerate() {
+                        momentum[j] -= point.weight * point.force(slot, &linear.stress);
+                    }
+                }
+                let forces = discretisation
+                    .divergence()
+                    .iter()
+                    .zip(discretisation.gradient());
+                for (&(cell, j, _), force) in forces {
+                    momentum[j] += force * trial.p[cell];
+                }
+                let volume = discretisation.grid().cell_volume();
+                for ((r, p), _) in continuity
+                    .iter_mut()
+                    .zip(&trial.p)
+                    .zip(released)
+                    .filter(|(_, released)| **released)
+                {
+                    *r = volume * p;
+                }
+            },
+        );
     }
 
     /// Decides which cells let go: those that would have to be pulled together to keep their
@@ -534,18 +553,22 @@ impl<const C: usize> PrimalDual<C> {
     ) {
         let (du, dp) = self.change.split_at(self.trial.u.len());
         let points = problem.discretisation.points();
-        for ((point, linear), s) in points.iter().zip(&self.points).zip(&mut self.trial.s) {
-            let rate = point.strain_rate_change(du);
-            let pressure = point.pressure_change(dp);
-            for (a, s) in s.iter_mut().enumerate() {
-                let mut target = linear.stress[a];
-                for (by_rate, rate) in linear.by_rate[a].iter().zip(&rate) {
-                    target += by_rate * rate;
+        let linear = &self.points;
+        threads::over(&mut self.trial.s, POINTS, &|first, stresses| {
+            let points = points[first..].iter().zip(&linear[first..]);
+            for ((point, linear), s) in points.zip(stresses) {
+                let rate = point.strain_rate_change(du);
+                let pressure = point.pressure_change(dp);
+                for (a, s) in s.iter_mut().enumerate() {
+                    let mut target = linear.stress[a];
+                    for (by_rate, rate) in linear.by_rate[a].iter().zip(&rate) {
+                        target += by_rate * rate;
+                    }
+                    target += linear.by_pressure[a] * pressure;
+                    *s += fraction * (target - *s);
                 }
-                target += linear.by_pressure[a] * pressure;
-                *s += fraction * (target - *s);
             }
-        }
+        });
         for (u, d) in self.trial.u.iter_mut().zip(du) {
             *u += fraction * d;
         }
@@ -586,22 +609,22 @@ impl<const C: usize> PrimalDual<C> {
         let divergence = self.continuity_residual(problem.discretisation);
         self.evaluate(problem, floor);
         let momentum = &mut self.right_hand_side[..self.trial.u.len()];
-        let mut stress = 0.0;
-        let states = self.evaluations.iter().zip(&self.trial.s);
-        for ((evaluation, s), kept) in states.zip(&mut self.misses) {
-            let Evaluation {
-                gamma,
-                rate,
-                threshold,
-                ..
-            } = *evaluation;
-            let miss: [f64; C] = std::array::from_fn(|a| s[a] * rate - threshold.stress * gamma[a]);
-            let scale = rate * (threshold.stress + 1e-3);
-            *kept = strain_rate_norm(miss) / scale;
-            stress = largest_or_nan(stress, *kept);
-        }
+        let (evaluations, trial, misses) = (&self.evaluations, &self.trial, &mut self.misses);
+        let (momentum, stress) = threads::join(
+            evaluations.len() > POINTS,
+            || momentum_residual(problem, u_old, trial, momentum),
+            || {
+                let mut stress = 0.0;
+                let states = evaluations.iter().zip(&trial.s);
+                for ((evaluation, s), kept) in states.zip(misses) {
+                    *kept = evaluation.miss(s);
+                    stress = largest_or_nan(stress, *kept);
+                }
+                stress
+            },
+        );
         Residuals {
-            momentum: momentum_residual(problem, u_old, &self.trial, momentum),
+            momentum,
             divergence,
             stress,
             strain_rate_floor: floor,
@@ -705,6 +728,17 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> YieldSolver<R,
     /// Three attempts: from the previous stress at the final ε, from a large ε, and from a larger
     /// one with slow descent and line search.
     fn step(
+        &mut self,
+        problem: &StepProblem<'_, R, D, C, V>,
+        state: &mut FlowState<C>,
+    ) -> Result<StepReport, Error> {
+        let pays = self.right_hand_side.len() >= threads::MANY;
+        threads::with_help(pays, || self.make_step(problem, state))
+    }
+}
+
+impl<const C: usize> PrimalDual<C> {
+    fn make_step<R: Rheology, const D: usize, const V: usize>(
         &mut self,
         problem: &StepProblem<'_, R, D, C, V>,
         state: &mut FlowState<C>,
