@@ -23,6 +23,7 @@ use super::panels::Panels;
 use super::subtrees::Subtree;
 use super::supernodal::{Bench, Factorisation, Layout, SMALLEST_PIVOT};
 use crate::error::Error;
+use crate::threads;
 
 /// LDLᵀ factors of the lower triangle of a matrix of fixed pattern, with −δ on the diagonal of the
 /// second block.
@@ -91,10 +92,17 @@ impl QuasiDefinite {
         let kind = match (symbolic.raw(), symbolic.perm()) {
             (SymbolicCholeskyRaw::Supernodal(supernodes), Some(order)) if loose => {
                 let tree = Subtree::new(supernodes, pieces.as_ref());
-                let panels = Panels::new(supernodes, &tree, order.arrays().0);
-                let layout = Layout::new(pattern, order, supernodes, sign);
+                let (panels, (layout, bench)) = threads::join(
+                    diagonal.len() >= threads::MANY,
+                    || Panels::new(supernodes, &tree, order.arrays().0),
+                    || {
+                        let layout = Layout::new(pattern, order, supernodes, sign);
+                        let bench = Bench::new(supernodes, &layout, &tree);
+                        (layout, bench)
+                    },
+                );
                 Kind::Loose {
-                    bench: Bench::new(supernodes, &layout, &tree),
+                    bench,
                     layout,
                     tree,
                     panels,

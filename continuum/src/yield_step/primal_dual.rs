@@ -256,13 +256,14 @@ impl<const C: usize> PrimalDual<C> {
         )?;
         let velocities = discretisation.velocities();
         let cells = discretisation.cells();
+        let pays = velocities + cells >= threads::MANY;
+        let matrix = threads::with_help(pays, || {
+            let (tolerance, solver) = (options.linear_tolerance, options.linear_solver);
+            StepMatrix::new(discretisation, tolerance, solver)
+        })?;
         Ok(Self {
             options,
-            matrix: StepMatrix::new(
-                discretisation,
-                options.linear_tolerance,
-                options.linear_solver,
-            )?,
+            matrix,
             trial: FlowState::at_rest(discretisation, vec![0.0; cells]),
             points: vec![LinearisedPoint::default(); discretisation.points().len()],
             released: vec![false; cells],
@@ -725,8 +726,6 @@ fn functional<R: Rheology, const D: usize, const C: usize, const V: usize>(
 impl<R: Rheology, const D: usize, const C: usize, const V: usize> YieldSolver<R, D, C, V>
     for PrimalDual<C>
 {
-    /// Three attempts: from the previous stress at the final ε, from a large ε, and from a larger
-    /// one with slow descent and line search.
     fn step(
         &mut self,
         problem: &StepProblem<'_, R, D, C, V>,
@@ -738,6 +737,8 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> YieldSolver<R,
 }
 
 impl<const C: usize> PrimalDual<C> {
+    /// Three attempts: from the previous stress at the final ε, from a large ε, and from a larger
+    /// one with slow descent and line search.
     fn make_step<R: Rheology, const D: usize, const V: usize>(
         &mut self,
         problem: &StepProblem<'_, R, D, C, V>,
