@@ -1,7 +1,7 @@
 //! Work side by side on the threads of the caller's pool.
 //!
 //! Threads of a pool go to sleep when there is nothing to do, and to wake one takes longer than most of what is done side by
-//! side in a step. So one that may help stands by awake while a step's equations are solved ([`with_help`]).
+//! side in a step. So those that may help stand by awake during an iteration on a step's equations ([`with_help`]).
 //!
 //! A caller inside a pool of rayon's (`ThreadPool::install`) gets its threads; any other has one. What is done side by
 //! side is cut by what there is to do, never by the number of threads, and every sum has one order, so that the bits do

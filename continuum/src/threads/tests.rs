@@ -32,7 +32,7 @@ fn same_on_all(flow: impl Fn() -> String + Sync) {
     assert_eq!(none, 0, "one thread has nobody to share with");
     for threads in [2, 3] {
         let (found, taken) = on(threads, &flow);
-        assert!(taken > 100, "{threads} threads: {taken} tasks shared");
+        assert!(taken > 10, "{threads} threads: {taken} tasks shared");
         assert!(found == one, "{threads} threads: other bits");
     }
 }
@@ -118,7 +118,7 @@ fn a_column_that_is_begun_anew_on_other_threads_has_the_same_bits() {
         go_on(&mut collapse, 5);
         collapse.flow().state().clone()
     });
-    assert!(taken > 100, "{taken} tasks shared");
+    assert!(taken > 10, "{taken} tasks shared");
     let (anew, _) = on(3, || {
         let mut collapse = begun();
         collapse.set_state(state).unwrap();

@@ -179,6 +179,17 @@ struct Strategy {
     solves_parts: bool,
 }
 
+/// How one iteration of an attempt is made.
+struct Iteration {
+    is_first: bool,
+    floor: f64,
+    /// Relative residual of the linear system.
+    tolerance: f64,
+    /// Whether factors of the iteration before may serve.
+    keeps_factors: bool,
+    line_search: bool,
+}
+
 /// The default solver of time steps. It holds the matrix and the work arrays of one grid.
 pub struct PrimalDual<const C: usize = COMPONENTS> {
     options: PrimalDualOptions,
@@ -304,6 +315,7 @@ impl<const C: usize> PrimalDual<C> {
         // The pressure that a stress was found with may not be that which is interpolated now.
         self.evaluate(problem, floor);
         self.bring_stress_to_threshold();
+        let pays = self.right_hand_side.len() >= threads::MANY;
         // In space mirrored flows are to stay alike, to which loose systems and choices do not contribute.
         let keeps = D == 2;
         let solves_parts = strategy.solves_parts
@@ -321,34 +333,21 @@ impl<const C: usize> PrimalDual<C> {
         // What was left over what is allowed when the count of changes to and fro began.
         let mut left_when_counting = f64::INFINITY;
         for iteration in 0..strategy.max_iterations {
-            self.release(problem.discretisation, iteration == 0);
-            self.linearise(problem, floor);
-            self.assemble(problem, u_old);
             report.iterations += 1;
             report.linear_solves += 1;
-            let clock = Instant::now();
-            let system = &mut self.matrix.system;
-            let prepared = if keeps && floor == floor_of_factors {
-                system.keep_or_factorise()
-            } else {
-                system.factorise()
+            let this = Iteration {
+                is_first: iteration == 0,
+                floor,
+                tolerance,
+                keeps_factors: keeps && floor == floor_of_factors,
+                line_search: strategy.line_search,
             };
             floor_of_factors = floor;
-            let solved = prepared
-                .and_then(|()| system.solve(&self.right_hand_side, &mut self.change, tolerance));
-            let factors = system.take_factor_time();
-            self.times.factors += factors;
-            self.times.krylov += clock.elapsed().as_secs_f64() - factors;
-            if solved.is_err() {
+            let Some(fraction) =
+                threads::with_help(pays, || self.iterate(problem, u_old, &this, report))
+            else {
                 return;
-            }
-            let fraction = if strategy.line_search {
-                self.line_search(problem, u_old, floor)
-            } else {
-                1.0
             };
-            self.update(problem, floor, fraction);
-            report.residuals = self.residuals(problem, u_old, floor);
             let is_last_floor = floor <= self.options.strain_rate_floor;
             let mut allowed = given.copied().unwrap_or_else(|| self.tolerances(problem));
             for _ in 0..MOST_PARTS {
@@ -404,6 +403,40 @@ impl<const C: usize> PrimalDual<C> {
                 floor = (floor * strategy.factor).max(self.options.strain_rate_floor);
             }
         }
+    }
+
+    /// One iteration of the whole: the part of the change that was made, or none if there was no linear solution.
+    fn iterate<R: Rheology, const D: usize, const V: usize>(
+        &mut self,
+        problem: &StepProblem<'_, R, D, C, V>,
+        u_old: &[f64],
+        this: &Iteration,
+        report: &mut StepReport,
+    ) -> Option<f64> {
+        self.release(problem.discretisation, this.is_first);
+        self.linearise(problem, this.floor);
+        self.assemble(problem, u_old);
+        let clock = Instant::now();
+        let system = &mut self.matrix.system;
+        let prepared = if this.keeps_factors {
+            system.keep_or_factorise()
+        } else {
+            system.factorise()
+        };
+        let (right_hand_side, change) = (&self.right_hand_side, &mut self.change);
+        let solved = prepared.and_then(|()| system.solve(right_hand_side, change, this.tolerance));
+        let factors = system.take_factor_time();
+        self.times.factors += factors;
+        self.times.krylov += clock.elapsed().as_secs_f64() - factors;
+        solved.ok()?;
+        let fraction = if this.line_search {
+            self.line_search(problem, u_old, this.floor)
+        } else {
+            1.0
+        };
+        self.update(problem, this.floor, fraction);
+        report.residuals = self.residuals(problem, u_old, this.floor);
+        Some(fraction)
     }
 
     /// Relative residual to which the next linear system is solved: a part of what is left of the way, by which the
@@ -726,20 +759,9 @@ fn functional<R: Rheology, const D: usize, const C: usize, const V: usize>(
 impl<R: Rheology, const D: usize, const C: usize, const V: usize> YieldSolver<R, D, C, V>
     for PrimalDual<C>
 {
-    fn step(
-        &mut self,
-        problem: &StepProblem<'_, R, D, C, V>,
-        state: &mut FlowState<C>,
-    ) -> Result<StepReport, Error> {
-        let pays = self.right_hand_side.len() >= threads::MANY;
-        threads::with_help(pays, || self.make_step(problem, state))
-    }
-}
-
-impl<const C: usize> PrimalDual<C> {
     /// Three attempts: from the previous stress at the final ε, from a large ε, and from a larger
     /// one with slow descent and line search.
-    fn make_step<R: Rheology, const D: usize, const V: usize>(
+    fn step(
         &mut self,
         problem: &StepProblem<'_, R, D, C, V>,
         state: &mut FlowState<C>,
