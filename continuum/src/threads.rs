@@ -10,7 +10,9 @@
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// From so many unknowns on it pays to share what takes tens of microseconds.
-pub(crate) const MANY: usize = 2000;
+pub(crate) const MANY: usize = 3000;
+/// Items are shared from so many times on what is done at a time.
+pub(crate) const WORTH_HALVING: usize = 3;
 /// Most threads that stand by.
 const HELPERS: usize = 3;
 /// Looks for something to do before others are given way to.
@@ -37,7 +39,8 @@ pub(crate) fn are_many() -> bool {
     rayon::current_thread_index().is_some() && rayon::current_num_threads() > 1
 }
 
-/// Works on items side by side, so many of them at a time, given the number of the first.
+/// Works on items side by side, so many of them at a time where there are several times as many, given the number of the
+/// first.
 pub(crate) fn over<T: Send>(
     items: &mut [T],
     at_a_time: usize,
@@ -60,7 +63,7 @@ pub(crate) fn over<T: Send>(
             || halve(high, first + middle, at_a_time, work),
         );
     }
-    if are_many() {
+    if items.len() >= WORTH_HALVING * at_a_time && are_many() {
         halve(items, 0, at_a_time, work);
     } else {
         work(0, items);

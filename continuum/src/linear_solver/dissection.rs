@@ -18,7 +18,7 @@ pub type Place<const D: usize = DIMENSIONS> = [u32; D];
 const SMALLEST_PIECE: usize = 12;
 
 /// Pieces of fewer velocities stay whole: halves of them are not worth another thread.
-const SMALLEST_HALVED: usize = 1500;
+const SMALLEST_HALVED: usize = 2000;
 
 /// An order of elimination as it came about: where a piece ends in it, and the two halves that come before its strip.
 #[derive(Debug)]

@@ -37,19 +37,24 @@ pub(super) struct QuasiDefinite {
 }
 
 enum Kind {
-    Tight {
-        symbolic: SymbolicCholesky<usize>,
-        signs: Vec<i8>,
-        scratch: MemBuffer,
-    },
-    /// Used in single precision.
-    Loose {
-        symbolic: SymbolicCholesky<usize>,
-        layout: Layout,
-        tree: Subtree,
-        bench: Bench,
-        panels: Panels,
-    },
+    Tight(Box<Tight>),
+    Loose(Box<Loose>),
+}
+
+/// Factors that are used in double precision.
+struct Tight {
+    symbolic: SymbolicCholesky<usize>,
+    signs: Vec<i8>,
+    scratch: MemBuffer,
+}
+
+/// Factors that are used in single precision.
+struct Loose {
+    symbolic: SymbolicCholesky<usize>,
+    layout: Layout,
+    tree: Subtree,
+    bench: Bench,
+    panels: Panels,
 }
 
 /// Supernodes are merged up to so many columns while zeros are less than this part of them. Substitution reads zeros,
@@ -101,24 +106,24 @@ impl QuasiDefinite {
                         (layout, bench)
                     },
                 );
-                Kind::Loose {
+                Kind::Loose(Box::new(Loose {
                     bench,
                     layout,
                     tree,
                     panels,
                     symbolic,
-                }
+                }))
             }
             _ => {
                 let need = symbolic
                     .factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default())
                     .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
-                Kind::Tight {
+                Kind::Tight(Box::new(Tight {
                     signs: (0..diagonal.len()).map(sign).collect(),
                     scratch: MemBuffer::try_new(need)
                         .map_err(|_| Error::LinearSolver("out of memory".to_owned()))?,
                     symbolic,
-                }
+                }))
             }
         };
         Ok(Self {
@@ -141,33 +146,31 @@ impl QuasiDefinite {
             self.values[slot as usize] -= self.regularisation;
         }
         match &mut self.kind {
-            Kind::Tight {
-                symbolic,
-                signs,
-                scratch,
-            } => symbolic
+            Kind::Tight(tight) => tight
+                .symbolic
                 .factorize_numeric_ldlt(
                     &mut self.factors,
                     SparseColMatRef::new(pattern, &self.values),
                     Side::Lower,
                     LdltRegularization {
-                        dynamic_regularization_signs: Some(signs),
+                        dynamic_regularization_signs: Some(&tight.signs),
                         dynamic_regularization_delta: SMALLEST_PIVOT,
                         dynamic_regularization_epsilon: SMALLEST_PIVOT,
                     },
                     Par::Seq,
-                    MemStack::new(scratch),
+                    MemStack::new(&mut tight.scratch),
                     Default::default(),
                 )
                 .map(|_| ())
                 .map_err(|e| Error::LinearSolver(format!("{e:?}"))),
-            Kind::Loose {
-                symbolic,
-                layout,
-                tree,
-                bench,
-                panels,
-            } => {
+            Kind::Loose(loose) => {
+                let Loose {
+                    symbolic,
+                    layout,
+                    tree,
+                    bench,
+                    panels,
+                } = &mut **loose;
                 let SymbolicCholeskyRaw::Supernodal(symbolic) = symbolic.raw() else {
                     return Err(Error::LinearSolver("no supernodes".to_owned()));
                 };
@@ -184,29 +187,66 @@ impl QuasiDefinite {
     /// Overwrites x with S⁻¹ x; there must be factors.
     pub(super) fn solve(&mut self, x: &mut [f64]) {
         match &mut self.kind {
-            Kind::Tight {
-                symbolic, scratch, ..
-            } => {
+            Kind::Tight(tight) => {
                 let rows = x.len();
-                LdltRef::new(symbolic, &self.factors).solve_in_place_with_conj(
+                LdltRef::new(&tight.symbolic, &self.factors).solve_in_place_with_conj(
                     Conj::No,
                     MatMut::from_column_major_slice_mut(x, rows, 1),
                     Par::Seq,
-                    MemStack::new(scratch),
+                    MemStack::new(&mut tight.scratch),
                 );
             }
-            Kind::Loose { panels, .. } => panels.substitute(x),
+            Kind::Loose(loose) => loose.panels.substitute(x),
         }
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::linear_solver::Blocks;
+    use faer::sparse::SymbolicSparseColMat;
 
-    /// The membrane of a square grid with a pressure for each second unknown: supernodes of many widths.
-    fn membrane(side: usize) -> (QuasiDefinite, Vec<f64>, Vec<Vec<f64>>) {
+    use super::*;
+    use crate::linear_solver::dissection::dissect;
+    use crate::linear_solver::{Blocks, Place};
+
+    /// A matrix by its coefficients, −δ included.
+    struct Membrane {
+        factors: QuasiDefinite,
+        pattern: SymbolicSparseColMat<usize>,
+        values: Vec<f64>,
+        delta: f64,
+    }
+
+    impl Membrane {
+        fn size(&self) -> usize {
+            self.pattern.ncols()
+        }
+
+        fn product(&self, x: &[f64]) -> Vec<f64> {
+            let mut y: Vec<f64> = vec![0.0; x.len()];
+            for (column, bounds) in self.pattern.col_ptr().windows(2).enumerate() {
+                for slot in bounds[0]..bounds[1] {
+                    y[self.pattern.row_idx()[slot]] += self.values[slot] * x[column];
+                }
+            }
+            let pressures = self.factors.definite..x.len();
+            pressures.for_each(|i| y[i] -= self.delta * x[i]);
+            y
+        }
+
+        /// Largest error of a solution, of which the right-hand side is made.
+        fn miss(&mut self) -> f64 {
+            let expected: Vec<f64> = (0..self.size()).map(|n| (1.7 * n as f64).sin()).collect();
+            let mut x = self.product(&expected);
+            self.factors.solve(&mut x);
+            let miss = x.iter().zip(&expected).map(|(x, e)| (x - e).abs());
+            miss.fold(0.0_f64, f64::max)
+        }
+    }
+
+    /// The membrane of a square grid with a pressure for each second unknown: supernodes of many widths. Where places are
+    /// known it is dissected; a bridge goes from one corner to the other, of which places know nothing.
+    fn membrane(side: usize, with_places: bool, with_bridge: bool) -> Membrane {
         let definite = side * side;
         let size = definite + definite / 2;
         let mut blocks = Blocks::default();
@@ -223,6 +263,9 @@ mod tests {
                 add([j, j + side], [0.9, -0.7, -0.7, 1.0]);
             }
         }
+        if with_bridge {
+            add([0, definite - 1], [0.3, -0.2, -0.2, 0.3]);
+        }
         for cell in 0..definite / 2 {
             add([2 * cell, definite + cell], [0.1, 0.5, 0.5, 0.0]);
         }
@@ -233,47 +276,107 @@ mod tests {
         for (&slot, c) in slots.iter().zip(&coefficients) {
             values[slot as usize] += c;
         }
-        let mut dense = vec![vec![0.0; size]; size];
-        for (column, bounds) in pattern.col_ptr().windows(2).enumerate() {
-            for slot in bounds[0]..bounds[1] {
-                dense[pattern.row_idx()[slot]][column] = values[slot];
-            }
-        }
         let delta = 0.5;
-        (definite..size).for_each(|i| dense[i][i] -= delta);
         let diagonal = diagonal.to_vec();
+        let place = |node: usize| [2 * (node % side) as u32, 2 * (node / side) as u32];
+        let places: Vec<Place> = (0..definite)
+            .chain((0..definite / 2).map(|cell| 2 * cell))
+            .map(place)
+            .collect();
+        let order = with_places.then(|| dissect(&places, definite));
         let mut factors =
-            QuasiDefinite::new(pattern.as_ref(), definite, delta, diagonal, None, true).unwrap();
+            QuasiDefinite::new(pattern.as_ref(), definite, delta, diagonal, order, true).unwrap();
         factors.factorise(pattern.as_ref(), &values).unwrap();
-        let x = (0..size).map(|n| (1.7 * n as f64).sin()).collect();
-        (factors, x, dense)
+        Membrane {
+            factors,
+            pattern,
+            values,
+            delta,
+        }
     }
 
     /// Factors in single precision solve the system to single precision, whatever the widths of supernodes.
     #[test]
     fn panels_solve_the_system_to_single_precision() {
         for side in [2, 7, 19] {
-            let (mut factors, expected, dense) = membrane(side);
-            assert!(matches!(factors.kind, Kind::Loose { .. }));
-            let product = |row: &Vec<f64>| row.iter().zip(&expected).map(|(a, x)| a * x).sum();
-            let mut x: Vec<f64> = dense.iter().map(product).collect();
-            factors.solve(&mut x);
-            let miss = x.iter().zip(&expected).map(|(x, e)| (x - e).abs());
-            let miss = miss.fold(0.0_f64, f64::max);
+            let mut membrane = membrane(side, false, false);
+            assert!(matches!(membrane.factors.kind, Kind::Loose(_)));
+            let miss = membrane.miss();
             assert!(miss < 1e-4, "{side}: {miss}");
         }
+    }
+
+    /// Halves of a large membrane are factorised each by itself, and a system with wide supernodes is solved. What
+    /// couples the halves past the strip between them makes one of them, and the solution stays.
+    #[test]
+    fn halves_stand_apart_unless_they_are_coupled() {
+        for (with_bridge, are_apart) in [(false, true), (true, false)] {
+            let mut membrane = membrane(120, true, with_bridge);
+            let Kind::Loose(loose) = &membrane.factors.kind else {
+                panic!("not in panels");
+            };
+            assert_eq!(loose.tree.halves.is_some(), are_apart);
+            let miss = membrane.miss();
+            assert!(miss < 1e-4, "{with_bridge}: {miss}");
+        }
+    }
+
+    /// The factors are those that faer makes of the same supernodes.
+    #[test]
+    fn factors_are_those_of_another_code() {
+        let membrane = membrane(120, true, false);
+        let factors = &membrane.factors;
+        let Kind::Loose(loose) = &factors.kind else {
+            panic!("not in panels");
+        };
+        let symbolic = &loose.symbolic;
+        let need = symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default());
+        let mut expected = vec![0.0; factors.factors.len()];
+        symbolic
+            .factorize_numeric_ldlt(
+                &mut expected,
+                SparseColMatRef::new(membrane.pattern.as_ref(), &factors.values),
+                Side::Lower,
+                LdltRegularization::default(),
+                Par::Seq,
+                MemStack::new(&mut MemBuffer::new(need)),
+                Default::default(),
+            )
+            .unwrap();
+        let SymbolicCholeskyRaw::Supernodal(supernodes) = symbolic.raw() else {
+            panic!("no supernodes");
+        };
+        let mut widest = 0;
+        for s in 0..supernodes.n_supernodes() {
+            let width = supernodes.supernode_end()[s] - supernodes.supernode_begin()[s];
+            let height = width + supernodes.supernode(s).pattern().len();
+            let place = supernodes.col_ptr_for_val()[s];
+            widest = widest.max(width);
+            for column in 0..width {
+                for row in column..height {
+                    let at = place + column * height + row;
+                    let (found, expected) = (factors.factors[at], expected[at]);
+                    let miss = (found - expected).abs();
+                    assert!(miss < 1e-12 * expected.abs().max(1.0), "{found} {expected}");
+                }
+            }
+        }
+        assert!(widest > 100, "{widest}: no supernode of several blocks");
     }
 
     /// What the processor is told to do gives the bits of plain loops.
     #[test]
     fn every_processor_gives_the_same_bits() {
-        let (mut factors, start, _) = membrane(19);
-        let Kind::Loose { panels, .. } = &mut factors.kind else {
+        let mut membrane = membrane(19, false, false);
+        let start: Vec<f64> = (0..membrane.size())
+            .map(|n| (1.7 * n as f64).sin())
+            .collect();
+        let Kind::Loose(loose) = &mut membrane.factors.kind else {
             panic!("not in panels");
         };
         let (mut fast, mut plain) = (start.clone(), start);
-        panels.substitute(&mut fast);
-        panels.substitute_plainly(&mut plain);
+        loose.panels.substitute(&mut fast);
+        loose.panels.substitute_plainly(&mut plain);
         assert!(
             fast.iter()
                 .zip(&plain)

@@ -6,8 +6,8 @@ use faer::sparse::SymbolicSparseColMat;
 
 use crate::threads;
 
-/// From so many coefficients on the columns are halved, for two threads.
-const SMALLEST_HALVED: usize = 20_000;
+/// Coefficients that are looked up by one thread.
+const AT_A_TIME: usize = 16_384;
 
 /// The coefficients of [[K, B], [C, 0]] without what K has above its diagonal.
 pub(super) struct Product {
@@ -46,7 +46,7 @@ impl Product {
         }
         begins.push([rows.len() as u32; 2]);
         let size = begins.len() - 1;
-        let middle = if rows.len() < SMALLEST_HALVED {
+        let middle = if size < threads::MANY {
             size
         } else {
             begins.partition_point(|begin| 2 * (begin[0] as usize) < rows.len())
@@ -64,7 +64,7 @@ impl Product {
     /// Takes the coefficients of now.
     pub(super) fn load(&mut self, values: &[f64]) {
         let slots = &self.slots;
-        threads::over(&mut self.values, SMALLEST_HALVED, &|first, here| {
+        threads::over(&mut self.values, AT_A_TIME, &|first, here| {
             for (value, &slot) in here.iter_mut().zip(&slots[first..]) {
                 *value = values[slot as usize];
             }

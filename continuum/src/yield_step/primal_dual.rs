@@ -480,7 +480,7 @@ impl<const C: usize> PrimalDual<C> {
         let (linear, trial, released) = (&self.points, &self.trial, &self.released);
         let (matrix, right_hand_side) = (&mut self.matrix, &mut self.right_hand_side);
         threads::join(
-            linear.len() > POINTS,
+            linear.len() >= threads::WORTH_HALVING * POINTS,
             || {
                 matrix.fill(discretisation, problem.dt, released, |q| {
                     let by_rate = &linear[q].by_rate;
@@ -645,7 +645,7 @@ impl<const C: usize> PrimalDual<C> {
         let momentum = &mut self.right_hand_side[..self.trial.u.len()];
         let (evaluations, trial, misses) = (&self.evaluations, &self.trial, &mut self.misses);
         let (momentum, stress) = threads::join(
-            evaluations.len() > POINTS,
+            evaluations.len() >= threads::WORTH_HALVING * POINTS,
             || momentum_residual(problem, u_old, trial, momentum),
             || {
                 let mut stress = 0.0;
