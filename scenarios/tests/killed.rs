@@ -183,6 +183,7 @@ fn a_killed_interval_of_grains_goes_on_in_the_middle_of_an_exchange() {
         &[
             "zones.moving=true",
             "zones.rest_speed_scaled=0.25",
+            "zones.wake_speed_scaled=0.26",
             "zones.hold_scaled=0.1",
             "duration_scaled=2",
             "output.frames=4",
