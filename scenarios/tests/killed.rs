@@ -1,8 +1,8 @@
 //! Runs that are killed or stopped at any moment go on to the same state.
 
 use crate::command::{
-    INSTALMENTS, MOVING_EDGE, SMALL_COMET_CLIFF, SMALL_HYBRID, SMALL_JOINED_COLUMN, colluvium,
-    hash, pause, succeed, table,
+    INSTALMENTS, INTERVAL, MOVING_EDGE, SMALL_COMET_CLIFF, SMALL_HYBRID, SMALL_JOINED_COLUMN,
+    colluvium, hash, pause, succeed, table,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -171,6 +171,27 @@ fn a_killed_joined_column_goes_on_in_the_middle_of_an_exchange() {
     .concat();
     let moves = killed_and_whole("column-collapse", &sets, 11, 3);
     let moves = table(&moves.path().join("parts/moves.csv")).1;
+    assert!(!moves.is_empty());
+}
+
+/// Grains between two continua, whose edges move.
+#[test]
+fn a_killed_interval_of_grains_goes_on_in_the_middle_of_an_exchange() {
+    let sets = [
+        SMALL_JOINED_COLUMN,
+        INTERVAL,
+        &[
+            "zones.moving=true",
+            "zones.rest_speed_scaled=0.25",
+            "zones.wake_speed_scaled=0.26",
+            "zones.hold_scaled=0.1",
+            "duration_scaled=2",
+            "output.frames=4",
+        ],
+    ]
+    .concat();
+    let run = killed_and_whole("column-collapse", &sets, 19, 3);
+    let moves = table(&run.path().join("parts/moves.csv")).1;
     assert!(!moves.is_empty());
 }
 

@@ -20,6 +20,7 @@ mod joined_bed;
 mod joined_cliff;
 mod joined_column;
 mod joined_incline;
+mod joined_interval;
 mod killed;
 mod malformed;
 mod open_chute;

@@ -117,17 +117,23 @@ impl AngularBook {
     }
 
     /// The continuum has this for the loads that are laid.
-    pub(super) fn answered_by(&mut self, counterpart: Counterpart) {
-        self.counterpart = counterpart;
+    pub(super) fn answered_by(&mut self, counterpart: &Counterpart) {
+        for kind in 0..2 {
+            self.counterpart.moments[kind] += counterpart.moments[kind];
+            self.counterpart.sizes[kind] += counterpart.sizes[kind];
+        }
     }
 
-    /// Notes a load on a grain.
+    /// Notes a load on a grain, with what it bears already.
     pub(super) fn lay(&mut self, grain: u32, parts: Parts) {
         let grain = grain as usize;
         if self.laid.len() <= grain {
             self.laid.resize(grain + 1, None);
         }
-        self.laid[grain] = Some(parts);
+        let sum = self.laid[grain].get_or_insert_default();
+        sum.traction += parts.traction;
+        sum.relaxation += parts.relaxation;
+        sum.moment += parts.moment;
     }
 
     /// Notes what grains brought that came, less what those took that went.

@@ -252,7 +252,7 @@ impl Shell {
             }
         }
         if let Some(book) = book {
-            book.answered_by(answer);
+            book.answered_by(&answer);
         }
         self.acted = 0.0;
         simulation.set_loads(&self.loads)

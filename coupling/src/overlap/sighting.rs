@@ -4,6 +4,7 @@
 //! over them, of which a snapshot's velocities are one. Here grains stand in the order of their numbers, contacts in
 //! that of their grains, and velocities and spins are those that the integrator holds, half a step back.
 
+use super::material_edge::Side;
 use colluvium_dem::{ContactSample, GrainSample, Partner, Simulation, Snapshot};
 use nalgebra::Vector3;
 
@@ -48,6 +49,19 @@ impl Sighting {
                 _ => None,
             }
         })
+    }
+
+    /// Looks at the grains as they are now, along the axis of an edge.
+    pub fn look_along(&mut self, side: Side, simulation: &mut Simulation) {
+        self.look(simulation);
+        if side == Side::Above {
+            for grain in &mut self.snapshot.grains {
+                *grain = side.grain(*grain);
+            }
+            for contact in &mut self.snapshot.contacts {
+                *contact = side.contact(*contact);
+            }
+        }
     }
 
     /// Looks at the grains as they are now.

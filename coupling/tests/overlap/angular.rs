@@ -118,16 +118,16 @@ fn a_flat_edge_in_a_box_keeps_all_three() {
 fn a_material_edge_keeps_that_about_its_slab() {
     let mut joined = Joined::with_edge(false, false, 11.0, Some(TRAVEL));
     joined
-        .edge
+        .zone
         .open_angular_book(&mut joined.simulation)
         .unwrap();
     joined.advance(12.0, 1.0);
-    let moves = joined.edge.moves().len();
+    let moves = joined.edge().moves().len();
     println!("{moves} moves");
     assert!(moves > 0);
     let entries = ["weight", "traction", "relaxation", "handed"];
     closes(
-        joined.edge.angular_book().unwrap(),
+        joined.zone.angular_book().unwrap(),
         &joined.simulation,
         &[1],
         &entries,

@@ -13,12 +13,12 @@ impl Joined {
         for (given, damped) in given.iter_mut().zip(self.damped) {
             *given += damped;
         }
-        let account = self.edge.account(&self.simulation);
-        let owed = self.edge.owed(&self.simulation);
-        let now = self.edge.grain_momentum(&mut self.simulation);
+        let account = self.zone.account(&self.simulation);
+        let owed = self.zone.owed(&self.simulation);
+        let now = self.zone.grain_momentum(&mut self.simulation);
         [
-            self.edge.mass_error(&self.simulation),
-            self.edge.volume_error(),
+            self.zone.mass_error(&self.simulation),
+            self.zone.volume_error(),
             account.grains_error([now[0] - given[0], now[1] - given[1]]),
             account.exchange_error(owed),
         ]
@@ -26,7 +26,7 @@ impl Joined {
 
     /// Most by which the handshake surface has moved from these places (d).
     pub fn moved(&self, before: &[f64]) -> f64 {
-        let pairs = self.edge.handshake().iter().zip(before);
+        let pairs = self.edge().handshake().iter().zip(before);
         pairs
             .map(|(x, before)| (x - before).abs())
             .fold(0.0, f64::max)
@@ -61,8 +61,8 @@ fn outline(simulation: &Simulation, place: f64) -> Vec<f64> {
 fn a_pile_that_rests_goes_on_resting() {
     let place = 4.0;
     let run = |uncoupled: bool| {
-        let mut joined = Joined::cut(pile(), spec(settled_fraction(), uncoupled, place, None));
-        let before = joined.edge.handshake().to_vec();
+        let mut joined = Joined::cut(pile(), &[spec(settled_fraction(), uncoupled, place, None)]);
+        let before = joined.edge().handshake().to_vec();
         let start = outline(&joined.simulation, place);
         joined.advance(10.0, 1.0);
         let sunk = start.iter().zip(outline(&joined.simulation, place));
@@ -71,7 +71,7 @@ fn a_pile_that_rests_goes_on_resting() {
             .fold(0.0, f64::max);
         let books = joined.books([0.0; 2]);
         let (speeds, moved) = (joined.speeds(), joined.moved(&before));
-        let escaped = joined.edge.monitors().escaped;
+        let escaped = joined.edge().monitors().escaped;
         println!(
             "uncoupled {uncoupled}: speeds {speeds:?}, handshake moved {moved:.3}, outline {sunk:.3}, escaped {escaped}, books {books:?}"
         );
@@ -93,10 +93,10 @@ fn a_pile_that_rests_goes_on_resting() {
 #[test]
 fn a_spray_through_the_overlap_falls_back_and_keeps_its_books() {
     let simulation = Simulation::new(setup(settled().to_vec(), true)).unwrap();
-    let mut joined = Joined::cut(simulation, spec(settled_fraction(), false, EDGE, None));
+    let mut joined = Joined::cut(simulation, &[spec(settled_fraction(), false, EDGE, None)]);
     joined.advance(5.0, 0.9);
     let count = joined.simulation.grain_count();
-    let before = joined.edge.grain_momentum(&mut joined.simulation);
+    let before = joined.zone.grain_momentum(&mut joined.simulation);
     joined.simulation.give_velocity(|grain| {
         let turn = 2.4 * f64::from(grain.id);
         match grain.position.z > 0.5 * HEIGHT {
@@ -104,7 +104,7 @@ fn a_spray_through_the_overlap_falls_back_and_keeps_its_books() {
             false => grain.velocity,
         }
     });
-    let after = joined.edge.grain_momentum(&mut joined.simulation);
+    let after = joined.zone.grain_momentum(&mut joined.simulation);
     let given = [after[0] - before[0], after[1] - before[1]];
     let highest = |joined: &Joined| {
         let heights = joined.simulation.held(|_| true).map(|g| g.position.z);
@@ -117,7 +117,7 @@ fn a_spray_through_the_overlap_falls_back_and_keeps_its_books() {
     println!(
         "thrown to {up:.1}, then {:.1}; speeds {speeds:?}, escaped {}, books {books:?}",
         highest(&joined),
-        joined.edge.monitors().escaped
+        joined.edge().monitors().escaped
     );
     assert!(up > HEIGHT + 3.0);
     assert_eq!(joined.simulation.grain_count(), count);
@@ -159,16 +159,16 @@ fn rests(stiffer: f64, lighter: f64, step: f64) {
         simulation.advance(500).unwrap();
         simulation.damp(0.8);
     }
-    let mut joined = Joined::cut(simulation, spec);
+    let mut joined = Joined::cut(simulation, &[spec]);
     joined.advance(8.0, 0.9);
-    let before = joined.edge.handshake().to_vec();
+    let before = joined.edge().handshake().to_vec();
     joined.advance(4.0, 1.0);
     let (speeds, moved, books) = (
         joined.speeds(),
         joined.moved(&before),
         joined.books([0.0; 2]),
     );
-    let monitors = joined.edge.monitors();
+    let monitors = joined.edge().monitors();
     println!(
         "{stiffer} times as stiff, {lighter} times lighter: speeds {speeds:?}, moved {moved:.3}, force ratio {:.2}, escaped {}, books {books:?}",
         monitors.force_ratio(),
@@ -198,9 +198,9 @@ fn grains_twenty_times_lighter_rest_among_others() {
 #[ignore = "minutes; run by tests/validate.sh"]
 fn a_million_steps_of_rest() {
     let simulation = Simulation::new(setup(settled().to_vec(), true)).unwrap();
-    let mut joined = Joined::cut(simulation, spec(settled_fraction(), false, EDGE, None));
+    let mut joined = Joined::cut(simulation, &[spec(settled_fraction(), false, EDGE, None)]);
     joined.advance(15.0, 0.9);
-    let before = joined.edge.handshake().to_vec();
+    let before = joined.edge().handshake().to_vec();
     let mass = joined.books([0.0; 2])[0];
     for part in 1..=10 {
         joined.advance(1e5 * STEP, 1.0);
@@ -225,5 +225,5 @@ fn a_million_steps_of_rest() {
         books[1].abs() < 1e-10 && books[2] < 1e-10 && books[3] < 1e-10,
         "{books:?}"
     );
-    assert_eq!(joined.edge.monitors().escaped, 0.0);
+    assert_eq!(joined.edge().monitors().escaped, 0.0);
 }

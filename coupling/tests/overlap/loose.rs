@@ -6,7 +6,10 @@ use nalgebra::Vector3;
 
 fn rested(uncoupled: bool) -> Joined {
     let simulation = Simulation::new(setup(settled().to_vec(), true)).unwrap();
-    let mut joined = Joined::cut(simulation, spec(settled_fraction(), uncoupled, EDGE, None));
+    let mut joined = Joined::cut(
+        simulation,
+        &[spec(settled_fraction(), uncoupled, EDGE, None)],
+    );
     if !uncoupled {
         joined.advance(10.0, 0.9);
     }
@@ -15,7 +18,7 @@ fn rested(uncoupled: bool) -> Joined {
 
 /// The shell's grain nearest to a height.
 fn of_shell(joined: &Joined, height: f64) -> u32 {
-    let edge = &joined.edge;
+    let edge = joined.edge();
     let shell = joined.simulation.held(|_| true);
     let shell = shell.filter(|g| edge.label(g).is_some_and(|label| label < 0.6));
     let off = |g: &GrainSample| (g.position.z - height).abs();
@@ -32,10 +35,10 @@ fn grain(joined: &Joined, id: u32) -> GrainSample {
 
 /// Momentum along x and z (N s) that the grains get when one is given a velocity.
 fn throw(joined: &mut Joined, id: u32, velocity: Vector3<f64>) -> [f64; 2] {
-    let before = joined.edge.grain_momentum(&mut joined.simulation);
+    let before = joined.zone.grain_momentum(&mut joined.simulation);
     let give = |g: &GrainSample| if g.id == id { velocity } else { g.velocity };
     joined.simulation.give_velocity(give);
-    let after = joined.edge.grain_momentum(&mut joined.simulation);
+    let after = joined.zone.grain_momentum(&mut joined.simulation);
     [0, 1].map(|axis| after[axis] - before[axis])
 }
 
@@ -84,7 +87,7 @@ fn a_grain_torn_out_of_the_edge_is_carried_by_the_continuum() {
     // Its weight is the continuum's to bear: without what that was given the exchange would not close.
     assert!(
         joined
-            .edge
+            .zone
             .account(&joined.simulation)
             .exchange_error([0.0; 2])
             > 0.0
@@ -98,16 +101,16 @@ fn a_grain_torn_out_of_the_edge_is_carried_by_the_continuum() {
 fn a_grain_that_flies_off_the_edge_is_of_the_shell_no_more() {
     let mut joined = rested(false);
     // What rests is among its neighbours.
-    assert_eq!(joined.edge.monitors().renewed, 0.0);
+    assert_eq!(joined.edge().monitors().renewed, 0.0);
     let shell = joined.simulation.held(|_| true);
-    let shell = shell.filter(|g| joined.edge.label(g).is_some_and(|label| label < 1.5));
+    let shell = shell.filter(|g| joined.edge().label(g).is_some_and(|label| label < 1.5));
     let highest = shell.max_by(|a, b| a.position.z.total_cmp(&b.position.z));
     let thrown = highest.unwrap();
-    let before = joined.edge.handshake().to_vec();
+    let before = joined.edge().handshake().to_vec();
     throw(&mut joined, thrown.id, Vector3::new(1.0, 0.0, 5.0));
     joined.advance(15.0, 1.0);
     let landed = grain(&joined, thrown.id);
-    let label = joined.edge.label(&landed).unwrap();
+    let label = joined.edge().label(&landed).unwrap();
     println!(
         "landed {:.1} d off with label {label:.1}; the handshake moved {:.2e} d",
         landed.position.x - EDGE,
@@ -116,6 +119,6 @@ fn a_grain_that_flies_off_the_edge_is_of_the_shell_no_more() {
     assert!(landed.position.x > EDGE + 5.0);
     // It is beyond what anything is exchanged with.
     assert!(label > 6.0, "{label}");
-    assert!(joined.edge.monitors().renewed > 0.0);
+    assert!(joined.edge().monitors().renewed > 0.0);
     assert!(joined.moved(&before) < 0.3);
 }

@@ -4,7 +4,9 @@ use super::world::{DENSITY, STEP, STIFFNESS, law};
 use colluvium_continuum::column_collapse::CollapseCase;
 use colluvium_continuum::free_surface::SurfaceOptions;
 use colluvium_continuum::rheology::MuI;
-use colluvium_coupling::overlap::material_edge::{MaterialEdge, MaterialEdgeSpec, Travel};
+use colluvium_coupling::overlap::material_edge::{
+    GrainZone, MaterialEdge, MaterialEdgeSpec, Side, Travel,
+};
 use colluvium_coupling::overlap::{OverlapSettings, Scales};
 use colluvium_dem::preparation::*;
 use colluvium_dem::*;
@@ -14,19 +16,24 @@ use std::sync::OnceLock;
 
 const LENGTH: f64 = 20.0;
 pub const HEIGHT: f64 = 8.0;
-const WIDTH: f64 = 5.0;
+pub const WIDTH: f64 = 5.0;
 pub const EDGE: f64 = 6.0;
 
 pub fn setup(grains: Vec<Grain>, gate: bool) -> Setup {
+    setup_of(LENGTH, grains, gate)
+}
+
+/// Of a column of another length.
+pub fn setup_of(length: f64, grains: Vec<Grain>, gate: bool) -> Setup {
     let mut walls = vec![
         Wall::plane(Vector3::zeros(), Vector3::x()),
         Wall::plane(Vector3::zeros(), Vector3::z()),
     ];
     if gate {
-        walls.push(Wall::plane(LENGTH * Vector3::x(), -Vector3::x()));
+        walls.push(Wall::plane(length * Vector3::x(), -Vector3::x()));
     }
     Setup {
-        domain: domain(),
+        domain: domain(length),
         gravity: -Vector3::z(),
         law: law().into(),
         grains,
@@ -37,10 +44,10 @@ pub fn setup(grains: Vec<Grain>, gate: bool) -> Setup {
     }
 }
 
-fn domain() -> Domain {
+fn domain(length: f64) -> Domain {
     Domain {
         lower: Vector3::new(0.0, 0.0, -1.0),
-        upper: Vector3::new(3.0 * LENGTH, WIDTH, 4.0 * HEIGHT),
+        upper: Vector3::new(3.0 * length, WIDTH, 4.0 * HEIGHT),
         periodic: [false, true, false],
     }
 }
@@ -48,39 +55,42 @@ fn domain() -> Domain {
 /// Grains at rest between the wall and a gate, cut level.
 pub fn settled() -> &'static [Grain] {
     static COLUMN: OnceLock<Vec<Grain>> = OnceLock::new();
-    COLUMN.get_or_init(|| {
-        let radius = RadiusLaw::Uniform {
-            low: 0.45,
-            high: 0.55,
-        };
-        let cloud = Insertion {
-            region: Region::Block {
-                lower: Vector3::zeros(),
-                upper: Vector3::new(LENGTH, WIDTH, 2.6 * HEIGHT),
-            },
-            domain: domain(),
-            ingredients: vec![Ingredient::alone(radius, DENSITY)],
-            amount: Amount::Grains(960),
-            gap: 0.0,
-            velocity: Vector3::zeros(),
-            tries: TRIES,
-            seed: 5,
-        };
-        let (grains, _) = insert_loose(&cloud, &[]).unwrap();
-        let mut simulation = Simulation::new(setup(grains, true)).unwrap();
-        let rest = Relaxation {
-            rest: Rest {
-                kinetic: 1e-7,
-                unbalanced: 0.01,
-            },
-            ..Relaxation::under(1.0)
-        };
-        let mut go = |_: &RestMeasures| ControlFlow::Continue(());
-        relax(&mut simulation, &rest, &mut go).unwrap();
-        simulation.remove(|g| g.position.z > HEIGHT - 0.3);
-        relax(&mut simulation, &rest, &mut go).unwrap();
-        simulation.grain_list()
-    })
+    COLUMN.get_or_init(|| settle(LENGTH))
+}
+
+/// The same in a column of another length.
+pub fn settle(length: f64) -> Vec<Grain> {
+    let radius = RadiusLaw::Uniform {
+        low: 0.45,
+        high: 0.55,
+    };
+    let cloud = Insertion {
+        region: Region::Block {
+            lower: Vector3::zeros(),
+            upper: Vector3::new(length, WIDTH, 2.6 * HEIGHT),
+        },
+        domain: domain(length),
+        ingredients: vec![Ingredient::alone(radius, DENSITY)],
+        amount: Amount::Grains((48.0 * length) as usize),
+        gap: 0.0,
+        velocity: Vector3::zeros(),
+        tries: TRIES,
+        seed: 5,
+    };
+    let (grains, _) = insert_loose(&cloud, &[]).unwrap();
+    let mut simulation = Simulation::new(setup_of(length, grains, true)).unwrap();
+    let rest = Relaxation {
+        rest: Rest {
+            kinetic: 1e-7,
+            unbalanced: 0.01,
+        },
+        ..Relaxation::under(1.0)
+    };
+    let mut go = |_: &RestMeasures| ControlFlow::Continue(());
+    relax(&mut simulation, &rest, &mut go).unwrap();
+    simulation.remove(|g| g.position.z > HEIGHT - 0.3);
+    relax(&mut simulation, &rest, &mut go).unwrap();
+    simulation.grain_list()
 }
 
 pub fn spec(
@@ -122,8 +132,10 @@ pub fn stiff_spec(
             overhang_degrees: 0.0,
         },
         options: SurfaceOptions::default(),
+        side: Side::Below,
         place,
         wall: 0.0,
+        back: 0.0,
         slab: WIDTH,
         settings: settings.resolve(&scales, false).unwrap(),
         travel,
@@ -136,12 +148,12 @@ pub fn settled_fraction() -> f64 {
         lower: Vector3::new(2.0, 0.0, 1.0),
         upper: Vector3::new(LENGTH - 2.0, WIDTH, HEIGHT - 1.5),
     };
-    solid_fraction(settled(), &domain(), &middle)
+    solid_fraction(settled(), &domain(LENGTH), &middle)
 }
 
 pub struct Joined {
     pub simulation: Simulation,
-    pub edge: MaterialEdge,
+    pub zone: GrainZone,
     /// Momentum of the grains that damping gave (negative: took), along x and z.
     pub damped: [f64; 2],
 }
@@ -155,37 +167,41 @@ impl Joined {
         let simulation = Simulation::new(setup(settled().to_vec(), gate)).unwrap();
         Self::cut(
             simulation,
-            spec(settled_fraction(), uncoupled, place, travel),
+            &[spec(settled_fraction(), uncoupled, place, travel)],
         )
     }
 
-    pub fn cut(mut simulation: Simulation, spec: MaterialEdgeSpec) -> Self {
-        let edge = MaterialEdge::cut(spec, &mut simulation).unwrap();
+    pub fn cut(mut simulation: Simulation, specs: &[MaterialEdgeSpec]) -> Self {
+        let zone = GrainZone::cut(specs, &mut simulation).unwrap();
         Self {
             simulation,
-            edge,
+            zone,
             damped: [0.0; 2],
         }
     }
 
+    pub fn edge(&self) -> &MaterialEdge {
+        &self.zone.edges()[0]
+    }
+
     pub fn advance(&mut self, time: f64, keep: f64) {
         let step = self.simulation.timestep();
-        let each = MaterialEdge::steps_of_loads(&self.edge.spec().settings, step);
+        let each = MaterialEdge::steps_of_loads(&self.edge().spec().settings, step);
         let all = (time / step).round() as u64;
         for _ in 0..all / each {
             for _ in 0..each {
-                self.edge.see_step(&self.simulation);
+                self.zone.see_step(&self.simulation);
                 self.simulation.advance(1).unwrap();
             }
-            let moves = self.edge.moves().len();
-            self.edge.go_on(&mut self.simulation).unwrap();
-            if self.edge.moves().len() > moves {
-                println!("{:.3?}", self.edge.moves().last());
+            let moves = self.edge().moves().len();
+            self.zone.go_on(&mut self.simulation).unwrap();
+            if self.edge().moves().len() > moves {
+                println!("{:.3?}", self.edge().moves().last());
             }
-            if keep < 1.0 && self.edge.at_exchange() {
-                let before = self.edge.grain_momentum(&mut self.simulation);
+            if keep < 1.0 && self.zone.at_exchange() {
+                let before = self.zone.grain_momentum(&mut self.simulation);
                 self.simulation.damp(keep);
-                let after = self.edge.grain_momentum(&mut self.simulation);
+                let after = self.zone.grain_momentum(&mut self.simulation);
                 for axis in 0..2 {
                     self.damped[axis] += after[axis] - before[axis];
                 }
@@ -199,18 +215,18 @@ impl Joined {
         let [twice, mass] = grains.fold([0.0; 2], |[e, m], g| {
             [e + g.mass * g.velocity.norm_squared(), m + g.mass]
         });
-        let continuum = 2.0 * self.edge.continuum_kinetic() / self.edge.continuum_mass();
+        let continuum = 2.0 * self.zone.continuum_kinetic() / self.zone.continuum_mass();
         [twice / mass, continuum].map(f64::sqrt)
     }
 
     /// Mean of the continuum's pressure over the weight above, behind the edge and in the overlap, in cells at least
     /// a quarter of the height below the surface.
     fn pressures(&self) -> [f64; 2] {
-        let density = self.edge.spec().density();
-        let top = self.edge.continuum_heights().1[2];
-        let [_, inner] = self.edge.spec().zones();
+        let density = self.edge().spec().density();
+        let top = self.edge().continuum_heights().1[2];
+        let [_, inner] = self.edge().spec().zones();
         let mut sums = [[0.0; 2]; 2];
-        for f in self.edge.collapse().fields() {
+        for f in self.edge().collapse().fields() {
             let [x, z] = [0, 1].map(|a| 0.5 * (f.lower[a] + f.upper[a]));
             if z > 0.75 * top || x > EDGE + inner || f.pressure <= 0.0 {
                 continue;
@@ -237,11 +253,11 @@ struct Calm {
 fn rest(uncoupled: bool, time: f64) -> Calm {
     let mut joined = Joined::new(true, uncoupled);
     joined.advance(15.0, 0.9);
-    let before = joined.edge.handshake().to_vec();
+    let before = joined.edge().handshake().to_vec();
     joined.advance(time, 1.0);
-    let monitors = joined.edge.monitors();
+    let monitors = joined.edge().monitors();
     let escaped = monitors.escaped;
-    let pairs = joined.edge.handshake().iter().zip(&before);
+    let pairs = joined.edge().handshake().iter().zip(&before);
     let moved = pairs.map(|(x, before)| (x - before).abs());
     let moved = moved.fold(0.0, f64::max);
     let fastest = joined.simulation.held(|_| true);
@@ -287,7 +303,7 @@ fn the_joint_knows_what_it_does_to_the_energy_of_grains() {
     joined.simulation.open_energy_ledger();
     joined.advance(5.0, 1.0);
     let booked = joined.simulation.energy_ledger().unwrap();
-    let monitors = joined.edge.monitors();
+    let monitors = joined.edge().monitors();
     let sizes: f64 = monitors.work.iter().map(|w| w.abs()).sum();
     let miss = monitors.work.iter().sum::<f64>() - booked.loads;
     println!(
@@ -319,7 +335,7 @@ fn an_edge_goes_with_the_flow_and_keeps_its_books() {
     let mut joined = Joined::with_edge(false, false, 11.0, Some(TRAVEL));
     let before = joined.simulation.grain_count() as f64;
     joined.advance(34.0, 1.0);
-    let edge = &joined.edge;
+    let (zone, edge) = (&joined.zone, joined.edge());
     let [inwards, outwards] = [1.0, -1.0].map(|sign| {
         let of = edge.moves().iter().filter(|m| m.mass * sign > 0.0);
         of.count()
@@ -331,10 +347,10 @@ fn an_edge_goes_with_the_flow_and_keeps_its_books() {
     assert!((edge.travelled() - 3.0 * (outwards as f64 - inwards as f64)).abs() < 1e-9);
     let most = edge.moves().iter().map(|m| m.grains).fold(0.0, f64::max);
     assert!(most > before);
-    let account = edge.account(&joined.simulation);
-    let owed = edge.owed(&joined.simulation);
-    let (mass, volume) = (edge.mass_error(&joined.simulation), edge.volume_error());
-    let now = joined.edge.grain_momentum(&mut joined.simulation);
+    let account = zone.account(&joined.simulation);
+    let owed = zone.owed(&joined.simulation);
+    let (mass, volume) = (zone.mass_error(&joined.simulation), zone.volume_error());
+    let now = joined.zone.grain_momentum(&mut joined.simulation);
     let (grains, exchange) = (account.grains_error(now), account.exchange_error(owed));
     println!("mass {mass:.2e}, volume {volume:.1e}, ledgers {grains:.1e} {exchange:.1e}");
     // A few hundred grains, whose strips and the continuum in their place differ by some grains.
@@ -352,27 +368,27 @@ fn a_journey_goes_on_from_its_numbers_and_within_its_budget() {
     let mut joined = Joined::with_edge(false, false, 11.0, Some(TRAVEL));
     joined.advance(9.0, 1.0);
     let mut memory = Vec::new();
-    joined.edge.write(&mut memory);
+    joined.zone.write(&mut memory);
     let record = joined.simulation.checkpoint();
-    let spec = *joined.edge.spec();
+    let spec = *joined.edge().spec();
     let resumed = Simulation::resume(setup(settled().to_vec(), false), &record).unwrap();
-    let edge = MaterialEdge::read(spec, &memory, &resumed).unwrap();
+    let zone = GrainZone::read(&[spec], &memory, &resumed).unwrap();
     let mut other = Joined {
         simulation: resumed,
-        edge,
+        zone,
         damped: [0.0; 2],
     };
     joined.advance(9.0, 1.0);
     other.advance(9.0, 1.0);
-    assert_eq!(joined.edge.moves(), other.edge.moves());
-    assert!(!joined.edge.moves().is_empty());
+    assert_eq!(joined.edge().moves(), other.edge().moves());
+    assert!(!joined.edge().moves().is_empty());
     assert_eq!(
         joined.simulation.state_hash(),
         other.simulation.state_hash()
     );
     let [mut ours, mut theirs] = [Vec::new(), Vec::new()];
-    joined.edge.write(&mut ours);
-    other.edge.write(&mut theirs);
+    joined.zone.write(&mut ours);
+    other.zone.write(&mut theirs);
     assert_eq!(ours, theirs);
 
     let most = joined.simulation.grain_count() as f64;
@@ -382,8 +398,8 @@ fn a_journey_goes_on_from_its_numbers_and_within_its_budget() {
     };
     let mut kept = Joined::with_edge(false, false, 11.0, Some(small));
     kept.advance(13.0, 1.0);
-    assert!(kept.edge.refused_moves() > 0.0);
-    assert!(kept.edge.moves().iter().all(|m| m.grains < most));
+    assert!(kept.edge().refused_moves() > 0.0);
+    assert!(kept.edge().moves().iter().all(|m| m.grains < most));
 }
 
 /// Mean spin about y and granular part of it (rms about the mean), of grains that were so far from the edge at the start,

@@ -8,6 +8,7 @@ mod comparison;
 mod growth;
 mod hard_cases;
 mod incline;
+mod interval;
 mod joined;
 mod loose;
 mod material;

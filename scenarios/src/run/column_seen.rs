@@ -70,7 +70,11 @@ impl SeenColumn {
         if !scene.has_room_for_a_joint() {
             return Ok(());
         }
-        let spec = JoinedColumn::new(scene, "").spec(self.course.solid_fraction)?;
+        let specs = JoinedColumn::new(scene, "").specs(self.course.solid_fraction)?;
+        // Of two edges the one on the wall's side is looked at.
+        let Some(&spec) = specs.first() else {
+            return Ok(());
+        };
         let mut witness = match self.labels.is_empty() {
             true => Witness::new(spec, simulation),
             false => Witness::of(spec, std::mem::take(&mut self.labels)),

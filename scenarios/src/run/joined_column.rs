@@ -23,7 +23,7 @@ use crate::vtkhdf::Frame;
 use colluvium_continuum::column_collapse::CollapseCase;
 use colluvium_continuum::rheology::MuI;
 use colluvium_coupling::overlap::OverlapError;
-use colluvium_coupling::overlap::material_edge::{MaterialEdge, MaterialEdgeSpec};
+use colluvium_coupling::overlap::material_edge::{GrainZone, MaterialEdge, MaterialEdgeSpec, Side};
 use colluvium_coupling::zones::Oracle;
 use colluvium_dem::preparation::solid_fraction;
 use colluvium_dem::{Simulation, Snapshot};
@@ -42,7 +42,7 @@ pub struct JoinedColumn<'a> {
 
 /// What the recipe's memory holds, in a form that goes on.
 struct Live {
-    edge: MaterialEdge,
+    zone: GrainZone,
     course: HeapCourse,
 }
 
@@ -51,23 +51,24 @@ impl std::fmt::Debug for Live {
         write!(
             f,
             "a joined column after {} exchanges",
-            self.edge.exchanges()
+            self.zone.exchanges()
         )
     }
 }
 
-/// Numbers in front of the edge's in the memory: solid fraction, and how many the edge has.
+/// Numbers in front of the zone's in the memory: solid fraction, and how many the zone has.
 const HEAD: usize = 2;
 
 /// Checks the scene before anything is written.
 pub(super) fn check(scene: &Scene, body: &CollapseScene) -> Result<(), Failure> {
     with_edge(body, &scene.origin, |column| {
         let named = |why: String| Failure::Input(format!("{}: {why}", scene.origin));
-        let spec = column.spec(crate::scene::DENSE)?;
-        spec.case.validate().map_err(|why| named(why.to_string()))?;
-        spec.options
-            .validate()
-            .map_err(|why| named(why.to_string()))?;
+        for spec in column.specs(crate::scene::DENSE)? {
+            spec.case.validate().map_err(|why| named(why.to_string()))?;
+            spec.options
+                .validate()
+                .map_err(|why| named(why.to_string()))?;
+        }
         super::world::course::check(scene, column)
     })
 }
@@ -163,10 +164,27 @@ impl<'a> JoinedColumn<'a> {
         })
     }
 
-    /// What the column is joined from, at a solid fraction.
-    pub(super) fn spec(&self, solid_fraction: f64) -> Result<MaterialEdgeSpec, Failure> {
+    /// What the column is joined from at each edge, at a solid fraction.
+    pub(super) fn specs(&self, solid_fraction: f64) -> Result<Vec<MaterialEdgeSpec>, Failure> {
+        let edges = self.scene.edges().into_iter();
+        edges
+            .map(|(side, place)| self.spec(side, place, solid_fraction))
+            .collect()
+    }
+
+    /// What it is joined from at an edge at a place along x (m).
+    fn spec(
+        &self,
+        side: Side,
+        place: f64,
+        solid_fraction: f64,
+    ) -> Result<MaterialEdgeSpec, Failure> {
         let scene = self.scene;
         let settings = scene.overlap_settings(&self.origin)?;
+        let [wall, back] = match side {
+            Side::Below => [scene.rest(); 2],
+            Side::Above => [scene.length(), scene.width()].map(|x| side.along(x)),
+        };
         Ok(MaterialEdgeSpec {
             case: CollapseCase {
                 aspect: scene.aspect,
@@ -178,12 +196,25 @@ impl<'a> JoinedColumn<'a> {
                 overhang_degrees: scene.overhang_degrees,
             },
             options: super::collapse::options(scene),
-            place: scene.edge(),
-            wall: scene.rest(),
+            side,
+            place: side.along(place),
+            wall,
+            back,
             slab: scene.slab(),
             travel: scene.travel(&settings),
             settings,
         })
+    }
+
+    /// What the edges are called in tables and summaries.
+    fn names(&self) -> Vec<String> {
+        let edges = self.scene.edges();
+        let name = |(side, _): &(Side, f64)| match side {
+            _ if edges.len() == 1 => "edge".to_owned(),
+            Side::Below => "low_edge".to_owned(),
+            Side::Above => "high_edge".to_owned(),
+        };
+        edges.iter().map(name).collect()
     }
 
     fn live(&self) -> MutexGuard<'_, Option<Live>> {
@@ -197,10 +228,10 @@ impl<'a> JoinedColumn<'a> {
         let (own, course) = rest
             .split_at_checked(head[1] as usize)
             .ok_or_else(damaged)?;
-        let edge = MaterialEdge::read(self.spec(head[0])?, own, simulation).map_err(failure)?;
+        let zone = GrainZone::read(&self.specs(head[0])?, own, simulation).map_err(failure)?;
         let course =
             HeapCourse::read(course, self.scene.heap_axis().columns).ok_or_else(damaged)?;
-        Ok(Live { edge, course })
+        Ok(Live { zone, course })
     }
 
     /// Cuts the column when the gate goes.
@@ -210,9 +241,9 @@ impl<'a> JoinedColumn<'a> {
             simulation.domain(),
             &self.scene.middle(),
         );
-        let edge = MaterialEdge::cut(self.spec(solid)?, simulation).map_err(failure)?;
+        let zone = GrainZone::cut(&self.specs(solid)?, simulation).map_err(failure)?;
         let mut live = Live {
-            edge,
+            zone,
             course: HeapCourse {
                 solid_fraction: solid,
                 ..HeapCourse::default()
@@ -223,8 +254,8 @@ impl<'a> JoinedColumn<'a> {
     }
 
     /// Exchanges between two looks at the front.
-    fn exchanges_of_a_front(&self, edge: &MaterialEdge) -> u64 {
-        (self.scene.duration() / FRONTS / edge.exchange_time())
+    fn exchanges_of_a_front(&self, zone: &GrainZone) -> u64 {
+        (self.scene.duration() / FRONTS / zone.exchange_time())
             .round()
             .max(1.0) as u64
     }
@@ -241,11 +272,11 @@ impl<'a> JoinedColumn<'a> {
         let solid = |radius: f64| 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
         let mut grains: Vec<(u32, [f64; 2])> = simulation
             .held(|x| f(x.y))
-            .filter(|g| live.edge.counts(g))
+            .filter(|g| live.zone.counts(g))
             .map(|g| (g.id, [g.position.x, solid(g.radius)]))
             .collect();
         grains.sort_unstable_by_key(|(id, _)| *id);
-        let parcels = live.edge.parcels();
+        let parcels = live.zone.parcels();
         let behind = parcels.into_iter().map(|[x, volume]| [x, part * volume]);
         let rows = grains.into_iter().map(|(_, row)| row).chain(behind);
         let base = live.course.solid_fraction * self.scene.slab() * part;
@@ -269,10 +300,12 @@ impl<'a> JoinedColumn<'a> {
         let Some(land) = self.scene.land(&self.origin)? else {
             return Ok(());
         };
-        let (x, h) = live.edge.continuum_heights();
         let least = 0.5 * self.scene.spacing();
-        let filled = x.iter().zip(&h).filter(|(_, h)| **h > least);
-        let reached = filled.fold(0.0, |most: f64, (x, _)| most.max(*x));
+        let reached = live.zone.edges().iter().fold(0.0, |most: f64, edge| {
+            let (x, h) = edge.continuum_heights();
+            let filled = x.iter().zip(&h).filter(|(_, h)| **h > least);
+            filled.fold(most, |most, (x, _)| most.max(*x))
+        });
         if reached + least <= land.level_up_to() {
             return Ok(());
         }
@@ -284,21 +317,21 @@ impl<'a> JoinedColumn<'a> {
     }
 
     fn remember(live: &Live, state: &mut Vec<f64>) {
-        let mut edge = Vec::with_capacity(state.len());
-        live.edge.write(&mut edge);
+        let mut zone = Vec::with_capacity(state.len());
+        live.zone.write(&mut zone);
         let mut course = Vec::new();
         live.course.write(&mut course);
         state.clear();
-        state.extend([live.course.solid_fraction, edge.len() as f64]);
-        state.append(&mut edge);
+        state.extend([live.course.solid_fraction, zone.len() as f64]);
+        state.append(&mut zone);
         state.append(&mut course);
     }
 
     /// Whether both sides together have come to rest, by the measure of a column of grains: what rests behind the edge
     /// counts as it would there, or the same heap would have to be calmer the fewer of it are grains.
     fn rests(&self, simulation: &mut Simulation, live: &mut Live) -> bool {
-        let unit = live.edge.whole_mass() * self.scene.gravity * self.scene.grains.diameter;
-        let kinetic = self.scene.kinetic_of_the_heap(simulation) + live.edge.continuum_kinetic();
+        let unit = live.zone.whole_mass() * self.scene.gravity * self.scene.grains.diameter;
+        let kinetic = self.scene.kinetic_of_the_heap(simulation) + live.zone.continuum_kinetic();
         let still = simulation.time() > BEGUN * self.scene.time_unit() && kinetic < STILL * unit;
         live.course.resting = if still {
             live.course.resting + 1.0
@@ -315,10 +348,16 @@ impl Recipe for JoinedColumn<'_> {
             0.0 => String::new(),
             rest => format!(", of which {rest:.4} m rest and are not computed"),
         };
+        let scene = self.scene;
+        let of = |(side, place): (Side, f64)| match side {
+            Side::Below => format!("within {place:.4} m of the wall is a continuum{rest}"),
+            Side::Above => format!("beyond {place:.4} m is a continuum"),
+        };
+        let places: Vec<String> = scene.edges().into_iter().map(of).collect();
         format!(
-            "{}; what lies within {:.4} m of the wall is a continuum{rest}",
-            self.scene.about(),
-            self.scene.edge()
+            "{}; what lies {}",
+            scene.about(),
+            places.join(", and what lies ")
         )
     }
 
@@ -365,16 +404,16 @@ impl Recipe for JoinedColumn<'_> {
         let Some(live) = guard.as_mut() else {
             return Ok(Course::On);
         };
-        live.edge.go_on(simulation).map_err(failure)?;
-        if !live.edge.at_exchange() {
-            live.edge.write_over(&mut state[HEAD..]);
+        live.zone.go_on(simulation).map_err(failure)?;
+        if !live.zone.at_exchange() {
+            live.zone.write_over(&mut state[HEAD..]);
             return Ok(Course::On);
         }
         let mut over = false;
         if live
-            .edge
+            .zone
             .exchanges()
-            .is_multiple_of(self.exchanges_of_a_front(&live.edge))
+            .is_multiple_of(self.exchanges_of_a_front(&live.zone))
         {
             let profile = live.course.fronts.len().is_multiple_of(PROFILE_EVERY);
             self.see(simulation, live, profile);
@@ -386,16 +425,16 @@ impl Recipe for JoinedColumn<'_> {
     }
 
     fn columns(&self) -> Vec<(String, &'static str)> {
-        [
+        let all = [
             ("x_front", "m"),
             ("height", "m"),
             ("continuum_kinetic", "J"),
-            ("edge_foot", "m"),
-            ("edge_top", "m"),
-            ("edge_label", "m"),
-        ]
-        .map(|(name, unit)| (name.to_owned(), unit))
-        .to_vec()
+        ];
+        let mut columns = all.map(|(name, unit)| (name.to_owned(), unit)).to_vec();
+        for named in self.names() {
+            columns.extend(["foot", "top", "label"].map(|part| (format!("{named}_{part}"), "m")));
+        }
+        columns
     }
 
     fn look(&self, simulation: &mut Simulation, _: &Snapshot, state: &[f64]) -> Vec<f64> {
@@ -405,20 +444,22 @@ impl Recipe for JoinedColumn<'_> {
             *guard = self.recalled(simulation, state).ok();
         }
         let Some(live) = guard.as_ref() else {
-            return vec![f64::NAN; 6];
+            return vec![f64::NAN; self.columns().len()];
         };
         let last = live.course.fronts.last();
         let [_, front, height] = last.copied().unwrap_or([f64::NAN; 3]);
-        let places = live.edge.handshake();
-        let end = |place: Option<&f64>| place.copied().unwrap_or(f64::NAN);
-        vec![
-            front,
-            height,
-            live.edge.continuum_kinetic(),
-            end(places.first()),
-            end(places.last()),
-            self.scene.edge() + live.edge.travelled(),
-        ]
+        let mut row = vec![front, height, live.zone.continuum_kinetic()];
+        for edge in live.zone.edges() {
+            let (places, spec) = (edge.handshake(), edge.spec());
+            let along = |place: f64| spec.side.along(place);
+            let end = |place: Option<&f64>| place.map_or(f64::NAN, |place| along(*place));
+            row.extend([
+                end(places.first()),
+                end(places.last()),
+                along(spec.place + edge.travelled()),
+            ]);
+        }
+        row
     }
 
     fn has_continuum(&self) -> bool {
@@ -431,7 +472,7 @@ impl Recipe for JoinedColumn<'_> {
             *guard = self.recalled(simulation, state).ok();
         }
         let live = guard.as_ref()?;
-        Some(pictures::cells(&live.edge, simulation.time()))
+        Some(pictures::cells(&live.zone, simulation.time()))
     }
 
     fn conclude(&self, ran: &mut Ran, summary: &mut Summary) -> Result<Vec<Table>, Failure> {

@@ -59,6 +59,14 @@ pub const MOVING_EDGE: &[&str] = &[
     "zones.hold_scaled=0.1",
 ];
 
+/// With these it is wider, and grains lie between a continuum at its wall and one that holds its front.
+pub const INTERVAL: &[&str] = &[
+    "aspect=0.25",
+    "grid.length_scaled=6",
+    "grains.packing=wide",
+    "zones.x=[0.8, 3.2]",
+];
+
 /// Every step of a continuum run stands in `steps.csv`, and what the summary says of the steps follows from it.
 pub fn steps_say_what_the_summary_says(run: &Path) {
     let (header, rows) = table(&run.join("steps.csv"));

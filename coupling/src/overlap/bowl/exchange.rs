@@ -188,7 +188,7 @@ impl Bowl {
             for (cell, force) in self.laid.relaxation.iter().enumerate() {
                 answer.add(1, &cells.centre(cell), force);
             }
-            book.answered_by(answer);
+            book.answered_by(&answer);
         }
         simulation.set_loads(&scratch.loads)?;
         self.scratch = scratch;

@@ -1,5 +1,7 @@
 //! What grains and continuum give each other, and what the monitors say.
 
+use super::side::Side;
+
 /// Momentum along x and z since the start (N s), and masses (kg).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub struct Account {
@@ -58,6 +60,19 @@ impl Account {
             self.continuum_weight,
             self.handed,
         ]
+    }
+
+    /// Adds the account of an edge, along its own axis. Volumes have units of their own and are left out.
+    pub(super) fn add(&mut self, edge: &Self, side: Side) {
+        let (own, more) = (self.rows(), edge.rows());
+        let mut sum = self.numbers();
+        for (k, (own, more)) in own.iter().zip(more).enumerate() {
+            let more = side.in_plane(more);
+            for axis in 0..2 {
+                sum[2 + 2 * k + axis] = own[axis] + more[axis];
+            }
+        }
+        *self = Self::of(&sum);
     }
 
     /// From such numbers.
@@ -149,8 +164,6 @@ pub struct Monitors {
     pub impulse: [f64; 2],
     /// Most grains beyond the edge by more than a diameter along its normal.
     pub escaped: f64,
-    /// Grains times their steps.
-    pub grain_steps: f64,
     /// Steps of the continuum, and active cells in them.
     pub steps: [f64; 2],
     /// Largest residual of the continuum's momentum.
@@ -168,7 +181,7 @@ pub struct Monitors {
 }
 
 /// Numbers of the monitors.
-pub const MONITORED: usize = 22;
+pub const MONITORED: usize = 21;
 
 impl Monitors {
     /// All of it in a row of numbers.
@@ -186,7 +199,6 @@ impl Monitors {
             self.steps[0],
             self.steps[1],
             self.residual,
-            self.grain_steps,
             self.newton[0],
             self.newton[1],
             self.renewed,
@@ -211,11 +223,10 @@ impl Monitors {
             escaped: n[8],
             steps: [n[9], n[10]],
             residual: n[11],
-            grain_steps: n[12],
-            newton: [n[13], n[14]],
-            renewed: n[15],
-            temperature: [n[16], n[17], n[18]],
-            work: [n[19], n[20], n[21]],
+            newton: [n[12], n[13]],
+            renewed: n[14],
+            temperature: [n[15], n[16], n[17]],
+            work: [n[18], n[19], n[20]],
         }
     }
 

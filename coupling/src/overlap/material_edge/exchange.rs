@@ -5,7 +5,7 @@ use super::embedded::Embedded;
 use super::rows::{Load, Row, bearers, slopes};
 use super::{MaterialEdge, OverlapError};
 use crate::overlap::angular::{AngularBook, Counterpart, Parts};
-use colluvium_dem::{GrainSample, Simulation};
+use colluvium_dem::{GrainSample, Load as Laid, Simulation};
 use nalgebra::Vector3;
 
 /// Cells with less of the mass of a full one are not spoken for by their grains.
@@ -24,7 +24,6 @@ pub struct Scratch {
     pub(super) shell: Vec<Load>,
     bearers: Vec<usize>,
     forces: Vec<[f64; 2]>,
-    loads: Vec<colluvium_dem::Load>,
 }
 
 /// A vector of the plane x–z in space.
@@ -33,34 +32,26 @@ fn in_slab([x, z]: [f64; 2]) -> Vector3<f64> {
 }
 
 impl MaterialEdge {
-    /// What follows the steps of the grains for which loads are held: books what they gave, exchanges where it is
-    /// time to, and lays the next loads.
+    /// What follows the steps of the grains for which loads are held: books what they gave, and exchanges where it is time
+    /// to. Says whether it was.
     ///
     /// # Errors
-    /// If the continuum's step fails or the grains refuse a load.
-    pub fn go_on(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
+    /// If the continuum's step fails.
+    pub(super) fn go_on(&mut self, simulation: &mut Simulation) -> Result<bool, OverlapError> {
         self.book_grains(simulation);
         self.made += 1;
-        if self.made == self.loads_of_exchange {
-            self.exchange(simulation)?;
-            self.made = 0;
-            self.exchanges += 1;
-            self.renew_labels();
-            let before = self
-                .angular
-                .is_some()
-                .then(|| simulation.leapfrog_angular_momentum());
-            self.travel(simulation)?;
-            if let Some((book, before)) = self.angular.as_mut().zip(before) {
-                book.hand(&(simulation.leapfrog_angular_momentum() - before));
-            }
+        if self.made < self.loads_of_exchange {
+            return Ok(false);
         }
-        self.lay(simulation)
+        self.exchange(simulation)?;
+        self.made = 0;
+        self.exchanges += 1;
+        self.renew_labels();
+        Ok(true)
     }
 
     /// Books the impulses of what was laid over the steps made since.
     pub(super) fn book_grains(&mut self, simulation: &Simulation) {
-        self.monitors.grain_steps += simulation.grain_count() as f64 * self.steps_of_loads as f64;
         let time = self.acting(simulation);
         for (sum, force) in self.given.relaxation.iter_mut().zip(&self.laid.relaxation) {
             for (sum, force) in sum.iter_mut().zip(force) {
@@ -70,46 +61,35 @@ impl MaterialEdge {
         for (work, power) in self.monitors.work.iter_mut().zip(self.laid.powers) {
             *work += power * time;
         }
-        let gravity = simulation.gravity();
-        let mass = self.grain_mass;
         for axis in 0..2 {
             let relaxation: f64 = self.laid.relaxation.iter().map(|f| f[axis]).sum();
             self.given.traction[axis] += self.laid.traction[axis] * time;
             self.given.impedance[axis] += self.laid.impedance[axis] * time;
             self.account.relaxation[axis] += relaxation * time;
-            self.account.weight[axis] += mass * [gravity.x, gravity.z][axis] * time;
         }
     }
 
-    /// Lays the loads of the next steps.
-    pub(super) fn lay(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
+    /// Forms the loads of the next steps, along x, in the order of the grains' numbers, noting what they consist of.
+    pub(super) fn lay(
+        &mut self,
+        simulation: &Simulation,
+        loads: &mut Vec<Laid>,
+        mut angular: Option<&mut AngularBook>,
+    ) {
         self.laid_at = simulation.steps_done();
         self.laid.clear();
-        let mut angular = self.angular.take();
-        let laid = self.lay_noting(simulation, angular.as_mut());
-        self.angular = angular;
-        laid
-    }
-
-    /// Lays them, noting what they consist of.
-    fn lay_noting(
-        &mut self,
-        simulation: &mut Simulation,
-        mut angular: Option<&mut AngularBook>,
-    ) -> Result<(), OverlapError> {
-        if let Some(book) = &mut angular {
-            book.begin();
-        }
         if self.spec.settings.uncoupled {
-            return Ok(());
+            return;
         }
+        let side = self.spec.side;
         let (shell, buffer) = (self.spec.settings.shell, self.spec.settings.buffer);
         let mut scratch = std::mem::take(&mut self.scratch);
         let reach = self.held.reach;
         scratch.near.clear();
         scratch.near.extend(
             simulation
-                .held(|x| x.x < reach)
+                .held(|x| side.along(x.x) < reach)
+                .map(|g| side.grain(g))
                 .filter_map(|g| self.labels.of(&g).map(|label| (g, label)))
                 .map(|(g, label)| (g, label, self.embedded(&g)))
                 .filter(|(_, label, embedded)| *label < buffer || embedded.weight > 0.0),
@@ -154,11 +134,9 @@ impl MaterialEdge {
             let slip = load.slip.map(|p| over(p, load.weight));
             let impedance = row.impedance(self.spec.settings.impedance, slip);
             let force = [0, 1].map(|axis| row.traction[axis] + impedance[axis]);
-            pressed.add(
-                0,
-                &in_slab([row.place, self.cells.height(k)]),
-                &in_slab(force),
-            );
+            let at = [row.place, self.cells.height(k)];
+            let [at, on_face] = [at, force].map(|v| in_slab(side.in_plane(v)));
+            pressed.add(0, &at, &on_face);
             let velocity = load.momentum.map(|p| over(p, load.weight));
             for (axis, (traction, impedance)) in row.traction.iter().zip(impedance).enumerate() {
                 self.laid.powers[0] += traction * velocity[axis];
@@ -168,8 +146,7 @@ impl MaterialEdge {
                 self.laid.impedance[axis] += impedance;
             }
         }
-        scratch.loads.clear();
-        let gravity = simulation.gravity();
+        let gravity = side.turned(simulation.gravity());
         let stopping = self.embedded_time();
         let mut relaxation = 0.0;
         for (grain, label, embedded) in &scratch.near {
@@ -200,14 +177,14 @@ impl MaterialEdge {
                 }
             }
             if force != [0.0; 2] || carried.y != 0.0 {
-                scratch.loads.push(colluvium_dem::Load {
+                let all = side.turned([force[0], carried.y, force[1]].into());
+                loads.push(Laid {
                     grain: grain.id,
-                    force: [force[0], carried.y, force[1]].into(),
+                    force: all,
                     moment: [0.0; 3].into(),
                 });
                 if let Some(book) = &mut angular {
-                    let all = Vector3::new(force[0], carried.y, force[1]);
-                    let traction = in_slab(traction);
+                    let traction = in_slab(side.in_plane(traction));
                     let parts = Parts {
                         traction,
                         relaxation: all - traction,
@@ -225,19 +202,18 @@ impl MaterialEdge {
                     self.cells.centre(cell % columns),
                     self.cells.height(cell / columns),
                 ];
-                pressed.add(1, &in_slab(at), &in_slab(*force));
+                let [at, on_cell] = [at, *force].map(|v| in_slab(side.in_plane(v)));
+                pressed.add(1, &at, &on_cell);
             }
-            book.answered_by(pressed);
+            book.answered_by(&pressed);
         }
-        let laid = simulation.set_loads(&scratch.loads);
         self.scratch = scratch;
-        Ok(laid?)
     }
 
     /// Averages of the grains to the continuum, its step, and what it does to the grains until the next exchange.
     fn exchange(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
         let dt = self.exchange_time();
-        self.sighting.look(simulation);
+        self.look(simulation);
         self.sum_up(-(-dt / self.spec.settings.stress_time).exp_m1());
         for (owed, given) in self.owed.iter_mut().zip(&self.given.relaxation) {
             for (owed, given) in owed.iter_mut().zip(given) {
@@ -416,7 +392,7 @@ impl MaterialEdge {
             .grains
             .iter()
             .filter(|g| self.labels.of(g).is_some_and(|label| label < buffer));
-        self.held.reach = near.fold(0.0, |most: f64, g| most.max(g.position.x)) + d;
+        self.held.reach = near.fold(self.spec.wall, |most: f64, g| most.max(g.position.x)) + d;
         let places = self.surface_of(0.5 * self.spec.settings.shell);
         let slopes = slopes(&places, &self.cells);
         let (h, slab) = (self.cells.spacing, self.spec.slab);

@@ -1,4 +1,4 @@
-//! All of a joined column as numbers: what a run goes on from with the same bits.
+//! All of an edge as numbers: what a run goes on from with the same bits.
 //!
 //! In front stands what every load changes, of a length that does not; behind it what an exchange changes, in rows
 //! with their lengths before them.
@@ -11,19 +11,14 @@ use colluvium_continuum::strain::SPACE_COMPONENTS;
 use colluvium_dem::{Patch, Simulation};
 
 /// Numbers in front but for the two rows of forces by cell, the account among them.
-const FRONT: usize = 18 + account::NUMBERS;
+const FRONT: usize = 17 + account::NUMBERS;
 
 impl MaterialEdge {
     /// What every load changes.
     fn front(&self) -> Vec<f64> {
         let mut front = Vec::with_capacity(FRONT + 4 * self.cells.count());
         let cells = self.cells.count() as f64;
-        front.extend([
-            cells,
-            self.made as f64,
-            self.laid_at as f64,
-            self.monitors.grain_steps,
-        ]);
+        front.extend([cells, self.made as f64, self.laid_at as f64]);
         for given in [&self.laid, &self.given] {
             front.extend(given.traction);
             front.extend(given.impedance);
@@ -37,13 +32,13 @@ impl MaterialEdge {
     }
 
     /// Writes what has changed since an exchange over what [`write`](Self::write) wrote after it.
-    pub fn write_over(&self, memory: &mut [f64]) {
+    pub(super) fn write_over(&self, memory: &mut [f64]) {
         let front = self.front();
         memory[..front.len()].copy_from_slice(&front);
     }
 
     /// Appends all there is; to be called after every exchange.
-    pub fn write(&self, memory: &mut Vec<f64>) {
+    pub(super) fn write(&self, memory: &mut Vec<f64>) {
         memory.extend(self.front());
         let mut put = |row: &[f64]| {
             memory.push(row.len() as f64);
@@ -83,18 +78,18 @@ impl MaterialEdge {
         continuum::write(self.collapse.flow().state(), &mut put);
     }
 
-    /// Goes on from what was written of a column with the same specification; the simulation is the one that was
+    /// Goes on from what was written of an edge with the same specification; the simulation is the one that was
     /// joined, resumed itself.
     ///
     /// # Errors
     /// If the numbers do not belong to this specification.
-    pub fn read(
+    pub(super) fn read(
         spec: MaterialEdgeSpec,
         memory: &[f64],
         simulation: &Simulation,
     ) -> Result<Self, OverlapError> {
         Self::read_back(spec, memory, simulation)?
-            .ok_or_else(|| OverlapError::Record("the joined column's memory misses a part".into()))
+            .ok_or_else(|| OverlapError::Record("an edge's memory misses a part".into()))
     }
 
     fn read_back(
@@ -168,7 +163,7 @@ impl MaterialEdge {
             && handshake.len() == edge.cells.counts[1]
             && edge.cells.count() == cells;
         let (scalars, forces) = front.split_at(FRONT);
-        let Ok(account) = scalars[18..].try_into() else {
+        let Ok(account) = scalars[17..].try_into() else {
             return Ok(None);
         };
         if !fits {
@@ -182,21 +177,19 @@ impl MaterialEdge {
         edge.held.reach = reach;
         edge.owed = owed.as_chunks::<2>().0.to_vec();
         edge.monitors = Monitors::of(monitors);
-        edge.monitors.grain_steps = scalars[3];
-        edge.monitors.work = [scalars[12], scalars[13], scalars[14]];
+        edge.monitors.work = [scalars[11], scalars[12], scalars[13]];
         edge.exchanges = exchanges as u64;
         edge.made = scalars[1] as u64;
         edge.laid_at = scalars[2] as u64;
         for (k, given) in [&mut edge.laid, &mut edge.given].into_iter().enumerate() {
-            let n = &scalars[4 + 4 * k..];
+            let n = &scalars[3 + 4 * k..];
             given.traction = [n[0], n[1]];
             given.impedance = [n[2], n[3]];
             let own = &forces[2 * cells * k..2 * cells * (k + 1)];
             given.relaxation = own.as_chunks::<2>().0.to_vec();
         }
-        edge.laid.powers = [scalars[15], scalars[16], scalars[17]];
+        edge.laid.powers = [scalars[14], scalars[15], scalars[16]];
         edge.account = Account::of(account);
-        edge.weigh(simulation);
         edge.collapse.set_state(state)?;
         edge.view.look(&edge.collapse, &edge.cells);
         edge.view.rest.ratio = ratio;

@@ -1,5 +1,7 @@
-//! A column of grains and a plane continuum behind it, joined at an edge that moves with the material.
+//! A column of grains and a plane continuum behind it, joined at an edge that moves with the material; or grains between two
+//! continua, joined to each at an edge of its own ([`GrainZone`]).
 //!
+//! An edge knows one axis, out of its continuum into the grains ([`Side`]), here x.
 //! At the start the edge is the vertical plane x = x_b. Grains lie beyond it; the continuum reaches from the wall at
 //! x = 0 to x_a, inside the grains. Each grain keeps the label ξ = x − x_b that it had at the start while it stays
 //! among its neighbours: labels say where in the overlap it is, however the material has deformed, and nothing ever crosses
@@ -33,21 +35,25 @@ mod memory;
 #[cfg(test)]
 mod rotation;
 mod rows;
+mod side;
+mod start;
 mod totals;
 mod travel;
 mod watch;
 mod witness;
+mod zone;
 
 pub use account::{Account, Monitors};
 pub use cells::Cells;
+pub use side::Side;
 pub use travel::{Move, Travel};
 pub use witness::{Through, Witness};
+pub use zone::GrainZone;
 
 use super::OverlapError;
-use super::angular::AngularBook;
 use super::rest_stress::RestStress;
 use super::settings::Resolved;
-use super::sighting::{Sighting, free_grains, free_mass};
+use super::sighting::{Sighting, free_grains};
 use cells::Sums;
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
 use colluvium_continuum::free_surface::{Outside, SurfaceOptions};
@@ -62,17 +68,22 @@ const NEARLY: f64 = 1.1;
 /// Fewest cells of continuum behind the edge.
 const LEAST_CELLS: f64 = 3.0;
 
-/// What a column is joined from (SI).
+/// What a column is joined from at one edge (SI). Places are on the edge's own axis, from the same origin as x
+/// ([`Side::along`]).
 #[derive(Clone, Copy, Debug)]
 pub struct MaterialEdgeSpec {
     /// The whole column as a continuum, at the solid fraction of its grains.
     pub case: CollapseCase,
     /// Settings of the continuum's solver.
     pub options: SurfaceOptions,
+    /// Where its continuum lies.
+    pub side: Side,
     /// Where the edge is at the start, x_b (m).
     pub place: f64,
-    /// Where the continuum begins, x_w (m); what lies behind rests.
+    /// Where the grid of the continuum begins, x_w, at a smooth wall (m); what lies behind rests.
     pub wall: f64,
+    /// Where the column begins at the start (m): x_w, or farther on, with a face that is free.
+    pub back: f64,
     /// Width of the slab across (m).
     pub slab: f64,
     /// Widths, times and the impedance.
@@ -98,9 +109,9 @@ impl MaterialEdgeSpec {
         self.case.length_scaled * self.case.height / self.case.cells as f64
     }
 
-    /// The column of the continuum that has a mass (kg), from x_w to x_a.
+    /// The column of the continuum that has a mass (kg), from where it begins to x_a.
     fn column(&self, mass: f64) -> CollapseCase {
-        let width = self.place + self.zones()[1] - self.wall;
+        let width = self.place + self.zones()[1] - self.back;
         let height = mass / (self.density() * self.slab * width);
         let spared = (self.wall / self.spacing()).floor().max(0.0) as usize;
         let cells = self.case.cells.saturating_sub(spared).max(1);
@@ -151,14 +162,12 @@ impl Given {
     }
 }
 
-/// Grains and continuum joined at an edge that moves with them. The grains are the caller's: every call needs the
-/// same simulation.
+/// Grains and continuum joined at an edge that moves with them: one of a [`GrainZone`]'s. All along its own axis but for what is
+/// said otherwise. The grains are the caller's: every call needs the same simulation.
 pub struct MaterialEdge {
     spec: MaterialEdgeSpec,
     cells: Cells,
     collapse: Collapse,
-    /// Mass of the free grains (kg).
-    grain_mass: f64,
     /// Mass of the continuum, copy included, and of what rests behind it (kg).
     continuum_mass: f64,
     rest_mass: f64,
@@ -184,7 +193,6 @@ pub struct MaterialEdge {
     sighting: Sighting,
     scratch: exchange::Scratch,
     outside: Outside,
-    angular: Option<AngularBook>,
 }
 
 impl MaterialEdge {
@@ -193,21 +201,17 @@ impl MaterialEdge {
         (settings.load_time / timestep).round().max(1.0) as u64
     }
 
-    /// Cuts a column of grains at the edge: what lies behind it becomes continuum.
-    ///
-    /// # Errors
-    /// Settings out of range, no grains on a side, or a continuum that cannot stand.
-    pub fn cut(spec: MaterialEdgeSpec, simulation: &mut Simulation) -> Result<Self, OverlapError> {
+    /// Gives all grains their labels and makes the continuum of those behind the edge, which are still there.
+    fn mark(spec: MaterialEdgeSpec, simulation: &mut Simulation) -> Result<Self, OverlapError> {
         let mut sighting = Sighting::default();
-        sighting.look(simulation);
+        sighting.look_along(spec.side, simulation);
         let [_, inner] = spec.zones();
         let free = || sighting.snapshot.grains.iter().filter(|g| !g.fixed);
         let last = free().map(|g| g.id).max().unwrap_or(0) as usize;
         let mut labels = vec![NO_LABEL; last + 1];
-        let (mut behind, mut before, mut total) = (0.0, 0.0, 0.0);
+        let (mut behind, mut before) = (0.0, 0.0);
         for grain in free() {
             let label = grain.position.x - spec.place;
-            total += grain.mass;
             if grain.position.x < spec.wall {
                 behind += grain.mass;
             } else if label < inner {
@@ -217,26 +221,36 @@ impl MaterialEdge {
         }
         let mut edge = Self::around(spec, [before, behind], labels, simulation)?;
         edge.sighting = sighting;
-        edge.account.mass = total;
         // Stresses as they are while all grains are still there.
         edge.sum_up(1.0);
         edge.remember_rest();
-        if let Some(travel) = spec.travel {
-            edge.put_by(&travel, simulation);
-        }
-        let floor = spec.place - spec.settings.inner;
-        let place = spec.place;
-        simulation.remove(|g| g.position.x < if g.fixed { floor } else { place });
-        edge.sighting.look(simulation);
-        edge.weigh(simulation);
-        edge.account.grains_before = edge.grain_momentum(simulation);
-        edge.account.continuum_before = edge.continuum_momentum();
-        edge.prime()?;
-        edge.agree();
-        // What it was primed with is not its state.
-        edge.view.look(&edge.collapse, &edge.cells);
-        edge.lay(simulation)?;
         Ok(edge)
+    }
+
+    /// Takes the grains behind the edge away.
+    fn cut_off(&mut self, simulation: &mut Simulation) {
+        if let Some(travel) = self.spec.travel {
+            self.put_by(&travel, simulation);
+        }
+        let (side, place) = (self.spec.side, self.spec.place);
+        let floor = place - self.spec.settings.inner;
+        simulation.remove(|g| side.along(g.position.x) < if g.fixed { floor } else { place });
+    }
+
+    /// Meets the grains that are left.
+    fn meet(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
+        self.look(simulation);
+        self.account.continuum_before = self.continuum_momentum();
+        self.prime()?;
+        self.agree();
+        // What it was primed with is not its state.
+        self.view.look(&self.collapse, &self.cells);
+        Ok(())
+    }
+
+    /// Looks at the grains as they are now, along its own axis.
+    fn look(&mut self, simulation: &mut Simulation) {
+        self.sighting.look_along(self.spec.side, simulation);
     }
 
     fn around(
@@ -255,7 +269,7 @@ impl MaterialEdge {
         if exchange < NEARLY * options.largest_step {
             options.largest_step = options.largest_step.max(copy::ROUNDED * exchange);
         }
-        let collapse = Collapse::new(&column, &options)?;
+        let collapse = start::column(&spec, &column, &options)?;
         let axes = collapse.flow().grid().axes();
         let cells = Cells {
             counts: [axes[0].cells(), axes[1].cells()],
@@ -266,7 +280,6 @@ impl MaterialEdge {
         Ok(Self {
             cells,
             collapse,
-            grain_mass: 0.0,
             continuum_mass: mass,
             rest_mass,
             labels: Labels {
@@ -304,7 +317,6 @@ impl MaterialEdge {
             sighting: Sighting::default(),
             scratch: exchange::Scratch::default(),
             outside: Outside::nothing(cells.count()),
-            angular: None,
             spec,
         })
     }
@@ -332,10 +344,12 @@ impl MaterialEdge {
         self.labels.of(grain)
     }
 
-    /// Whether totals count a grain: it lies in front of the handshake surface, whose other side they count as
+    /// Whether totals count a grain (along x): it lies in front of the handshake surface, whose other side they count as
     /// continuum. By its label it would be counted where the continuum is too, once labels have mixed.
     pub fn counts(&self, grain: &GrainSample) -> bool {
-        self.label(grain).is_some() && witness::is_before(grain, &self.cells, &self.held.handshake)
+        let grain = self.spec.side.grain(*grain);
+        self.label(&grain).is_some()
+            && witness::is_before(&grain, &self.cells, &self.held.handshake)
     }
 
     /// The continuum.
@@ -353,11 +367,9 @@ impl MaterialEdge {
         &self.spec
     }
 
-    /// Accounts since the start, with what the grains have been given since the last exchange.
-    pub fn account(&self, simulation: &Simulation) -> Account {
+    /// Its share of the accounts since the start, with what the grains have been given since the last exchange.
+    fn account(&self, simulation: &Simulation) -> Account {
         let mut account = self.account;
-        let gravity = simulation.gravity();
-        let weight = [gravity.x, gravity.z].map(|g| g * self.grain_mass);
         let time = self.acting(simulation);
         for axis in 0..2 {
             let relaxation: f64 = self.laid.relaxation.iter().map(|f| f[axis]).sum();
@@ -365,32 +377,8 @@ impl MaterialEdge {
             account.impedance[axis] +=
                 self.given.impedance[axis] + self.laid.impedance[axis] * time;
             account.relaxation[axis] += relaxation * time;
-            account.weight[axis] += weight[axis] * time;
         }
         account
-    }
-
-    /// Books angular momentum about the slab's axis y from now on, for which [`see_step`](Self::see_step) has to be called before every step
-    /// of the grains; what is written does not hold the account.
-    ///
-    /// # Errors
-    /// If the grains refuse the loads, which are laid anew.
-    pub fn open_angular_book(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
-        self.book_grains(simulation);
-        self.angular = Some(AngularBook::open(simulation));
-        self.lay(simulation)
-    }
-
-    /// Books the step that comes next.
-    pub fn see_step(&mut self, simulation: &Simulation) {
-        if let Some(book) = &mut self.angular {
-            book.see(simulation);
-        }
-    }
-
-    /// The account of angular momentum, if it is open.
-    pub fn angular_book(&self) -> Option<&AngularBook> {
-        self.angular.as_ref()
     }
 
     /// For how long what is laid has acted and is not booked yet (s).
@@ -430,27 +418,15 @@ impl MaterialEdge {
         self.made == 0
     }
 
-    /// Momentum of the grains along x and z, with what walls have taken (N s).
-    pub fn grain_momentum(&self, simulation: &mut Simulation) -> [f64; 2] {
-        let momentum = simulation.leapfrog_momentum() + simulation.wall_impulse();
-        [momentum.x, momentum.z]
-    }
-
-    /// Momentum of the free grains along x and z as they are held, without what walls have taken: the same bits after a
-    /// restart (N s).
-    fn held_momentum(simulation: &Simulation) -> [f64; 2] {
+    /// Momentum of the free grains as they are held, without what walls have taken: the same bits after a restart (N s).
+    fn held_momentum(&self, simulation: &Simulation) -> [f64; 2] {
         let grains = free_grains(simulation);
         let momenta = grains.iter().map(|g| g.mass * g.velocity);
         let sum = momenta.fold(nalgebra::Vector3::zeros(), |sum, p| sum + p);
-        [sum.x, sum.z]
+        self.spec.side.in_plane([sum.x, sum.z])
     }
 
-    /// Weighs the free grains.
-    fn weigh(&mut self, simulation: &Simulation) {
-        self.grain_mass = free_mass(simulation);
-    }
-
-    /// Momentum of the continuum along x and z, copy included (N s).
+    /// Momentum of the continuum, copy included (N s).
     pub fn continuum_momentum(&self) -> [f64; 2] {
         let unit = self.impulse_unit();
         self.collapse.flow().momentum().map(|p| p * unit)
@@ -471,11 +447,6 @@ impl MaterialEdge {
     /// Mass of the continuum, copy included (kg).
     pub fn continuum_mass(&self) -> f64 {
         self.continuum_mass
-    }
-
-    /// Mass of grains and continuum at the start, each counted on its side, and of what rests behind (kg).
-    pub fn whole_mass(&self) -> f64 {
-        self.account.mass
     }
 
     /// Mass of what rests behind the continuum (kg).

@@ -62,13 +62,17 @@ fn joined(rate: f64, drift: [f64; 2], ours: f64) -> (MaterialEdge, Simulation) {
             overhang_degrees: 0.0,
         },
         options: SurfaceOptions::default(),
+        side: Side::Below,
         place: EDGE,
         wall: 0.0,
+        back: 0.0,
         slab: WIDTH,
         settings: settings.resolve(&scales, false).unwrap(),
         travel: None,
     };
-    let mut edge = MaterialEdge::cut(spec, &mut simulation).unwrap();
+    let mut edge = MaterialEdge::mark(spec, &mut simulation).unwrap();
+    edge.cut_off(&mut simulation);
+    edge.meet(&mut simulation).unwrap();
     let centre = [EDGE, 0.5 * HEIGHT];
     let turn = |rate: f64, x: f64, z: f64| {
         [
@@ -96,11 +100,11 @@ fn joined(rate: f64, drift: [f64; 2], ours: f64) -> (MaterialEdge, Simulation) {
         }
     }
     edge.collapse.set_state(state).unwrap();
-    edge.sighting.look(&mut simulation);
+    edge.look(&mut simulation);
     edge.see_grains();
     edge.view.look(&edge.collapse, &edge.cells);
     edge.agree();
-    edge.lay(&mut simulation).unwrap();
+    edge.lay(&simulation, &mut Vec::new(), None);
     (edge, simulation)
 }
 

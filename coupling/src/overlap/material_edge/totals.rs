@@ -1,9 +1,31 @@
 //! What there is of both sides, each counted on its own side of the handshake surface.
 
-use super::MaterialEdge;
-use colluvium_dem::Simulation;
+use super::{MaterialEdge, Side};
+use colluvium_continuum::free_surface::CellFields;
 
 impl MaterialEdge {
+    /// Fields of the cells with material, copy included, along x and z, each with whether totals count its middle.
+    pub fn fields(&self) -> Vec<(CellFields, bool)> {
+        let (side, low) = (self.spec.side, self.cells.low);
+        let handshake = &self.held.handshake;
+        let turned = |mut cell: CellFields| {
+            cell.lower[0] += low;
+            cell.upper[0] += low;
+            let row = (cell.lower[1] / self.cells.spacing).round() as usize;
+            let middle = 0.5 * (cell.lower[0] + cell.upper[0]);
+            let counted = handshake.get(row).is_none_or(|place| middle < *place);
+            if side == Side::Above {
+                (cell.lower[0], cell.upper[0]) =
+                    (side.along(cell.upper[0]), side.along(cell.lower[0]));
+                cell.velocity = side.in_plane(cell.velocity);
+                // A shear stress changes its sign in a mirror, a difference of normal stresses does not.
+                cell.stress[1] = side.along(cell.stress[1]);
+            }
+            (cell, counted)
+        };
+        self.collapse.fields().into_iter().map(turned).collect()
+    }
+
     /// Error of the continuum's volume against what it began with and its copy was given since, relative.
     pub fn volume_error(&self) -> f64 {
         let now = self.collapse.flow().volume();
@@ -11,22 +33,7 @@ impl MaterialEdge {
         (now - start - self.account.copied) / start
     }
 
-    /// Mass of grains and of continuum that totals count, over that of all grains at the start, less 1: what the
-    /// handshake surface gained or lost by differences of both sides' motion.
-    pub fn mass_error(&self, simulation: &Simulation) -> f64 {
-        let mut masses: Vec<(u32, f64)> = simulation
-            .held(|_| true)
-            .filter(|g| self.counts(g))
-            .map(|g| (g.id, g.mass))
-            .collect();
-        masses.sort_unstable_by_key(|m| m.0);
-        let grains: f64 = masses.iter().map(|m| m.1).sum();
-        let solid: f64 = self.parcels().iter().map(|[_, volume]| volume).sum();
-        let continuum = solid * self.spec.case.rheology.grain_density;
-        (grains + continuum) / self.account.mass - 1.0
-    }
-
-    /// The continuum behind the handshake surface, and what rests behind it, as parcels: places along x (m) and
+    /// The continuum behind the handshake surface, and what rests behind it, as parcels: places on its own axis (m) and
     /// volumes of grains in them (m³).
     pub fn parcels(&self) -> Vec<[f64; 2]> {
         const PARTS: usize = 4;

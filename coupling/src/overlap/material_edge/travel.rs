@@ -133,7 +133,7 @@ impl MaterialEdge {
     /// Puts by what lies behind the edge when it is cut, as strips, as far as the edge may ever come back.
     pub(super) fn put_by(&mut self, travel: &Travel, simulation: &mut Simulation) {
         let least = super::LEAST_CELLS * self.cells.spacing;
-        let room = self.spec.place - self.spec.wall - least;
+        let room = self.spec.place - self.spec.back - least;
         let strips = (room / travel.width).max(0.0) as usize;
         for strip in (0..strips).rev() {
             let patch = simulation.take_out(|g| self.strip(g, travel.width) == Some(strip));
@@ -142,6 +142,7 @@ impl MaterialEdge {
     }
 
     fn strip(&self, grain: &GrainSample, width: f64) -> Option<usize> {
+        let grain = &self.spec.side.grain(*grain);
         let base = self.labels.base.iter().copied();
         let floor = base.fold(f64::INFINITY, f64::min) - self.spec.settings.inner;
         let fixed = grain.fixed;
@@ -153,13 +154,18 @@ impl MaterialEdge {
         )
     }
 
-    /// After an exchange: a move of the edge, if there is reason for one.
+    /// After an exchange: a move of the edge, if there is reason for one. Outwards it may go if `room` (m) of grains that belong to
+    /// no overlap have a strip to spare. Says whether it moved.
     ///
     /// # Errors
     /// If the continuum or the grains refuse.
-    pub(super) fn travel(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
+    pub(super) fn travel(
+        &mut self,
+        room: f64,
+        simulation: &mut Simulation,
+    ) -> Result<bool, OverlapError> {
         let Some(travel) = self.spec.travel.filter(|_| !self.spec.settings.uncoupled) else {
-            return Ok(());
+            return Ok(false);
         };
         self.carry_strips();
         let woken = self.continuum_speed(travel.width);
@@ -172,7 +178,8 @@ impl MaterialEdge {
             front,
             count,
         } = self.speed_beside(travel.width);
-        let rests = speed < travel.rest && front > travel.rest && count >= travel.fewest;
+        let has_room = count >= travel.fewest && room >= travel.width;
+        let rests = speed < travel.rest && front > travel.rest && has_room;
         self.journey.resting = if rests {
             self.journey.resting + 1.0
         } else {
@@ -182,17 +189,20 @@ impl MaterialEdge {
         if self.journey.resting * self.exchange_time() > hold {
             self.journey.resting = 0.0;
             self.go_out(&travel, speed, simulation)?;
+            return Ok(true);
         }
-        Ok(())
+        Ok(false)
     }
 
     /// What is kept goes where the continuum has gone since the last exchange.
     fn carry_strips(&mut self) {
         let dt = self.exchange_time();
+        let side = self.spec.side;
         for strip in &mut self.journey.strips {
             for grain in strip.grains.iter_mut().filter(|g| !g.fixed) {
-                let hats = self.cells.hats(grain.position.x, grain.position.z);
-                let [u, w] = self.view.velocity_at(&hats).unwrap_or([0.0; 2]);
+                let at = side.along(grain.position.x);
+                let hats = self.cells.hats(at, grain.position.z);
+                let [u, w] = side.in_plane(self.view.velocity_at(&hats).unwrap_or([0.0; 2]));
                 grain.position += dt * Vector3::new(u, 0.0, w);
                 grain.velocity = Vector3::new(u, 0.0, w);
             }
@@ -244,6 +254,28 @@ impl MaterialEdge {
         }
     }
 
+    /// Looks at the grains after another edge has moved, and gives labels to those that came with it: they lie as far from this
+    /// edge as it is now.
+    pub(super) fn see_newcomers(&mut self, known: &[u32], simulation: &mut Simulation) {
+        self.look(simulation);
+        for grain in self.sighting.snapshot.grains.iter().filter(|g| !g.fixed) {
+            if known.binary_search(&grain.id).is_ok() {
+                continue;
+            }
+            let rows = self.cells.rows(grain.position.z).into_iter();
+            let edge: f64 = rows.map(|(row, hat)| hat * self.held.rows[row].place).sum();
+            if let Some(label) = self.labels.given.get_mut(grain.id as usize) {
+                *label = grain.position.x - edge;
+            }
+        }
+    }
+
+    /// Numbers of the free grains that it saw when it looked, rising.
+    pub(super) fn seen(&self) -> Vec<u32> {
+        let free = self.sighting.snapshot.grains.iter().filter(|g| !g.fixed);
+        free.map(|g| g.id).collect()
+    }
+
     /// Gives all grains labels anew, for an edge at these places row by row (m).
     fn give_labels(&mut self, places: Vec<f64>) {
         self.labels.base = places;
@@ -267,7 +299,7 @@ impl MaterialEdge {
         // The copy of what changes hands says all that its grains say.
         self.see_grains();
         self.copy_the_grains(f64::INFINITY)?;
-        let before = Self::held_momentum(simulation);
+        let before = self.held_momentum(simulation);
         let patch = simulation.take_out(|g| self.strip(g, travel.width).is_some());
         let mass = -patch.mass();
         self.journey.strips.push(patch);
@@ -280,45 +312,45 @@ impl MaterialEdge {
         travel: &Travel,
         speed: f64,
         simulation: &mut Simulation,
-    ) -> Result<(), OverlapError> {
+    ) -> Result<bool, OverlapError> {
         let strips = &self.journey.strips;
         let more = strips.last().map_or(0, |patch| patch.grains.len());
         if (simulation.grain_count() + more) as f64 > travel.budget {
             self.journey.refused += 1.0;
-            return Ok(());
+            return Ok(false);
         }
         let Some(mut patch) = self.journey.strips.pop() else {
-            return Ok(());
+            return Ok(false);
         };
         for grain in &mut patch.grains {
             grain.spin = Vector3::zeros();
         }
+        let side = self.spec.side;
         let there = self.sighting.snapshot.grains.iter();
-        let there = there.map(|g| (g.position, g.radius)).collect();
+        let there = there.map(|g| (side.turned(g.position), g.radius)).collect();
         self.journey.displaced += make_room(&mut patch.grains, there, self.spec.slab);
-        let before = Self::held_momentum(simulation);
+        let before = self.held_momentum(simulation);
         let mass = patch.mass();
         simulation.put_back(&patch)?;
         let mut places = self.surface_of(0.0);
         for place in &mut places {
             *place -= travel.width;
         }
-        self.sighting.look(simulation);
+        self.look(simulation);
         self.give_labels(places);
         self.labels.edge -= travel.width;
         self.journey.returns += 1.0;
         self.handed([speed, mass], before, simulation);
-        Ok(())
+        Ok(true)
     }
 
     /// Books a move, and agrees on what holds after it.
     fn handed(&mut self, [speed, mass]: [f64; 2], before: [f64; 2], simulation: &mut Simulation) {
-        let now = Self::held_momentum(simulation);
-        self.weigh(simulation);
+        let now = self.held_momentum(simulation);
         for axis in 0..2 {
             self.account.handed[axis] += now[axis] - before[axis];
         }
-        self.sighting.look(simulation);
+        self.look(simulation);
         self.see_grains();
         self.agree();
         self.journey.moves.push(Move {

@@ -82,7 +82,7 @@ impl Witness {
     /// Gives the grains of a settled column their labels.
     pub fn new(spec: MaterialEdgeSpec, simulation: &mut Simulation) -> Self {
         let mut sighting = Sighting::default();
-        sighting.look(simulation);
+        sighting.look_along(spec.side, simulation);
         let free = || sighting.snapshot.grains.iter().filter(|g| !g.fixed);
         let last = free().map(|g| g.id).max().unwrap_or(0) as usize;
         let mut given = vec![NO_LABEL; last + 1];
@@ -101,7 +101,7 @@ impl Witness {
                 spec.case.cells.max(1),
                 (TALL * spec.case.height / h).ceil() as usize + 1,
             ],
-            low: 0.0,
+            low: spec.wall.min(0.0),
             spacing: h,
             slab: spec.slab,
         };
@@ -124,7 +124,7 @@ impl Witness {
 
     /// Looks at the grains as they are now, finds the surface anew and says what goes through it.
     pub fn look(&mut self, simulation: &mut Simulation) -> Through {
-        self.sighting.look(simulation);
+        self.sighting.look_along(self.spec.side, simulation);
         let [handshake, inner] = self.spec.zones();
         let at = [0.0, handshake, inner];
         let grains = &self.sighting.snapshot.grains;

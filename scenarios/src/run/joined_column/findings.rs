@@ -12,7 +12,7 @@ use crate::state_hash;
 use crate::summary::{Figure, Quantity, Summary};
 use crate::table::Table;
 use colluvium_coupling::overlap::bowl::Reason;
-use colluvium_coupling::overlap::material_edge::{MaterialEdge, Move};
+use colluvium_coupling::overlap::material_edge::{GrainZone, MaterialEdge, Move, Side};
 
 /// Limits of the monitors: slip over √(g H), ratio of forces less 1, share of the relaxation.
 const MOST_SLIP: f64 = 0.01;
@@ -30,7 +30,14 @@ impl JoinedColumn<'_> {
         };
         let per_area = DENSE * scene.slab() / scene.grain_volume();
         let all = per_area * scene.section(scene.height) + floor * scene.length();
-        (all - (per_area * scene.height + floor) * scene.edge()) / all
+        let left_out = scene.edges().into_iter().map(|(side, place)| {
+            let [column, ground] = match side {
+                Side::Below => [place; 2],
+                Side::Above => [scene.width() - place, scene.length() - place],
+            };
+            per_area * scene.height * column + floor * ground
+        });
+        (all - left_out.sum::<f64>()) / all
     }
 
     /// Where grains end and why, and what joins them.
@@ -44,24 +51,28 @@ impl JoinedColumn<'_> {
                 "computed: what lies 0.8 heights behind the end of the foot hardly flows"
             }
         };
-        let mut lines = vec![(
-            "zones".to_owned(),
-            format!(
+        let steps = format!(
+            "{:.0} % of the grain-steps of a column of grains",
+            100.0 * self.expected_share()
+        );
+        let zones = match scene.zones.x {
+            Some(_) => self.interval_in_words(&steps),
+            None => format!(
                 "continuum from x = {:.4} m (zones.rest_scaled = {:.4}; what lies behind rests) to x = {:.4} m ({:.1} d; zones.edge_scaled = \
-                 {:.4}: {why}), grains beyond; {:.0} % of the grain-steps of a column of grains",
+                 {:.4}: {why}), grains beyond; {steps}",
                 scene.rest(),
                 scene.rest() / scene.height,
                 scene.edge(),
                 scene.edge() / d,
                 scene.edge() / scene.height,
-                100.0 * self.expected_share()
             ),
-        )];
+        };
+        let mut lines = vec![("zones".to_owned(), zones)];
         if let Ok(s) = scene.overlap_settings(&self.origin) {
             lines.push((
                 "overlap".into(),
                 format!(
-                    "from the edge into the grains: {}, sideways pressure at rest forgotten in a strain of {}",
+                    "from each edge into the grains: {}, sideways pressure at rest forgotten in a strain of {}",
                     overlap_words(&s, d),
                     s.rest_strain
                 ),
@@ -85,6 +96,30 @@ impl JoinedColumn<'_> {
             ),
         ));
         lines
+    }
+
+    /// Where grains lie between continua.
+    fn interval_in_words(&self, steps: &str) -> String {
+        let scene = self.scene;
+        let d = scene.grains.diameter;
+        let of = |(side, place): (Side, f64)| match side {
+            Side::Below => format!(
+                "continuum from x = {:.4} m (zones.rest_scaled = {:.4}; what lies behind rests) to the low edge at {place:.4} m ({:.1} d)",
+                scene.rest(),
+                scene.rest() / scene.height,
+                place / d
+            ),
+            Side::Above => format!(
+                "continuum from the high edge at {place:.4} m ({:.1} d) on, with the column's front",
+                place / d
+            ),
+        };
+        let edges: Vec<String> = scene.edges().into_iter().map(of).collect();
+        let range = match scene.zones.x {
+            Some([from, to]) => format!("zones.x = [{from}, {to}]"),
+            None => String::new(),
+        };
+        format!("{}, grains between ({range}); {steps}", edges.join(", "))
     }
 
     /// Results of the run for the summary, and tables.
@@ -169,8 +204,15 @@ impl JoinedColumn<'_> {
                 .remarks
                 .push("Still moving at the end: duration_scaled is too short.".into());
         }
-        self.book(ran, &live.edge, summary);
-        self.watch(&live.edge, summary);
+        self.book(ran, &live.zone, summary);
+        for (edge, name) in live.zone.edges().iter().zip(self.names()) {
+            let prefix = match live.zone.edges().len() {
+                1 => String::new(),
+                _ => format!("{name}_"),
+            };
+            self.watch(edge, &prefix, summary);
+        }
+        state_of_overlaps(&live.zone, summary);
         summary.state_hash = state_hash::of_hashes(
             [ran.simulation.state_hash(), state_hash::of(&[&ran.state])]
                 .iter()
@@ -179,9 +221,9 @@ impl JoinedColumn<'_> {
         let land = scene.land(&self.origin)?;
         let own = live.course.tables(places.clone(), deposit.clone());
         let mut tables = Land::beside(land.as_ref(), &places, own);
-        tables.extend(sides(self, ran, &live.edge, (places, deposit)));
+        tables.extend(sides(self, ran, &live.zone, (places, deposit)));
         if scene.zones.moving {
-            tables.extend(moves(scene.edge(), &live.edge, summary));
+            tables.extend(moves(&live.zone, summary));
         }
         summary.figures.insert(
             0,
@@ -206,32 +248,33 @@ impl JoinedColumn<'_> {
     }
 
     /// Cost, mass and momentum.
-    fn book(&self, ran: &mut Ran, edge: &MaterialEdge, summary: &mut Summary) {
+    fn book(&self, ran: &mut Ran, zone: &GrainZone, summary: &mut Summary) {
         let steps = ran.simulation.steps_done();
         let [before, now] = [ran.packing.grains.len(), ran.simulation.grain_count()];
-        let monitors = edge.monitors();
-        let own = monitors.grain_steps as u64;
+        let own = zone.grain_steps() as u64;
+        let cell_steps: f64 = zone.edges().iter().map(|e| e.monitors().steps[1]).sum();
         let counted = summary.cost.grain_steps.min(steps * before as u64);
         summary.cost.grain_steps = summary.cost.grain_steps - counted + own;
-        summary.cost.cell_steps = monitors.steps[1] as u64;
+        summary.cost.cell_steps = cell_steps as u64;
         if summary.cost.wall_s > 0.0 {
             summary.cost.grain_steps_per_s = summary.cost.grain_steps as f64 / summary.cost.wall_s;
-            summary.cost.cell_steps_per_s = monitors.steps[1] / summary.cost.wall_s;
+            summary.cost.cell_steps_per_s = cell_steps / summary.cost.wall_s;
         }
         summary.model.grains = now as u64;
-        summary.model.cells = edge.cells().count() as u64;
+        let cells: usize = zone.edges().iter().map(|e| e.cells().count()).sum();
+        summary.model.cells = cells as u64;
         summary.put(
             "grain_steps_share",
-            Quantity::new(monitors.grain_steps / (steps * before as u64) as f64, "1")
+            Quantity::new(zone.grain_steps() / (steps * before as u64) as f64, "1")
                 .from("grain-steps of the run over those of the whole column, floor included"),
         );
-        let account = edge.account(&ran.simulation);
-        let grains = account.grains_error(edge.grain_momentum(&mut ran.simulation));
-        let exchange = account.exchange_error(edge.owed(&ran.simulation));
-        summary.ledger.mass_relative = edge.volume_error();
+        let account = zone.account(&ran.simulation);
+        let grains = account.grains_error(zone.grain_momentum(&mut ran.simulation));
+        let exchange = account.exchange_error(zone.owed(&ran.simulation));
+        summary.ledger.mass_relative = zone.volume_error();
         summary.put(
             "handshake_mass",
-            Quantity::new(edge.mass_error(&ran.simulation), "1").against(
+            Quantity::new(zone.mass_error(&ran.simulation), "1").against(
                 0.0,
                 "mass of grains and continuum on their sides of the handshake surface over that at the start, less 1",
             ),
@@ -251,7 +294,7 @@ impl JoinedColumn<'_> {
         ] {
             summary.put(name, Quantity::new(value, "1").against(0.0, source));
         }
-        let walls = account.from_walls_and_surface(edge.continuum_momentum());
+        let walls = account.from_walls_and_surface(zone.continuum_momentum());
         for (name, [x, z], source) in [
             ("weight", account.weight, "of the grains"),
             (
@@ -288,8 +331,9 @@ impl JoinedColumn<'_> {
         }
     }
 
-    /// What the monitors say, and in words what they should not.
-    fn watch(&self, edge: &MaterialEdge, summary: &mut Summary) {
+    /// What the monitors of an edge say, by names that begin so, and in words what they should not.
+    fn watch(&self, edge: &MaterialEdge, prefix: &str, summary: &mut Summary) {
+        let named = |name: &str| format!("{prefix}{name}");
         let monitors = edge.monitors();
         let unit = (self.scene.gravity * self.scene.height).sqrt();
         let slip = monitors.mean_slip() / unit;
@@ -333,7 +377,10 @@ impl JoinedColumn<'_> {
                 "most grains beyond the edge by more than a diameter along its normal, at any exchange",
             ),
         ] {
-            summary.put(name, Quantity::new(value, "1").against(right, source));
+            summary.put(
+                &named(name),
+                Quantity::new(value, "1").against(right, source),
+            );
         }
         let [grains, continuum] = monitors.forces();
         for (name, value, source) in [
@@ -348,11 +395,10 @@ impl JoinedColumn<'_> {
                 "the same of the continuum's stress and what it remembers of rest",
             ),
         ] {
-            summary.put(name, Quantity::new(value, "N").from(source));
+            summary.put(&named(name), Quantity::new(value, "N").from(source));
         }
-        overlap_state::put(monitors.temperatures(), monitors.work, summary);
         summary.put(
-            "rest_ratio",
+            &named("rest_ratio"),
             Quantity::new(edge.rest_ratio(), "1")
                 .from("sideways over vertical stress of the grains that became continuum, which it remembers"),
         );
@@ -374,10 +420,10 @@ impl JoinedColumn<'_> {
                 "of grains that had left their neighbours in the overlap",
             ),
         ] {
-            summary.put(name, Quantity::new(value, "1").from(source));
+            summary.put(&named(name), Quantity::new(value, "1").from(source));
         }
         summary.put(
-            "momentum_residual",
+            &named("momentum_residual"),
             Quantity::new(monitors.residual, "1").from("of the continuum, largest of any step"),
         );
         let misses = [
@@ -396,56 +442,68 @@ impl JoinedColumn<'_> {
         ];
         let on_forces = "Overlap: below yield a continuum's sideways stress is its law's own: what the joint does to its grains is force_of_grains \
                          over that of a run with model = \"dem\".";
-        if misses[1].0 {
+        if misses[1].0 && !summary.remarks.iter().any(|remark| remark == on_forces) {
             summary.remarks.push(on_forces.into());
         }
+        let of = match prefix.strip_suffix('_') {
+            Some(edge) => format!(" of {}", edge.replace('_', " ")),
+            None => String::new(),
+        };
         for (_, what, value) in misses.into_iter().filter(|(misses, ..)| *misses) {
-            summary
-                .remarks
-                .push(format!("Overlap: {what} is {value:.4}, outside its limit."));
+            summary.remarks.push(format!(
+                "Overlap{of}: {what} is {value:.4}, outside its limit."
+            ));
         }
     }
+}
+
+/// Temperatures and energies of the overlaps: means over the edges, and sums.
+fn state_of_overlaps(zone: &GrainZone, summary: &mut Summary) {
+    let edges = zone.edges();
+    let monitors = || edges.iter().map(|edge| edge.monitors());
+    let temperatures = [0, 1, 2].map(|k| {
+        let sum: f64 = monitors().map(|m| m.temperatures()[k]).sum();
+        sum / edges.len().max(1) as f64
+    });
+    let work = [0, 1, 2].map(|k| monitors().map(|m| m.work[k]).sum());
+    overlap_state::put(temperatures, work, summary);
 }
 
 /// Both sides by themselves, copies included, and the handshake surface.
 fn sides(
     column: &JoinedColumn,
     ran: &Ran,
-    edge: &MaterialEdge,
+    zone: &GrainZone,
     (places, deposit): (Vec<f64>, Vec<f64>),
 ) -> Vec<Table> {
     let scene = column.scene;
-    let base = edge.spec().case.rheology.solid_fraction * scene.slab();
+    let solid = zone
+        .edges()
+        .first()
+        .map(|e| e.spec().case.rheology.solid_fraction);
+    let base = solid.unwrap_or(DENSE) * scene.slab();
     let free = ran.seen.grains.iter().filter(|g| !g.fixed);
     let volume = |radius: f64| 4.0 / 3.0 * std::f64::consts::PI * radius.powi(3);
     let grains = scene
         .heap_axis()
         .heights(free.map(|g| [g.position.x, volume(g.radius)]), base);
-    let (xs, heights) = edge.continuum_heights();
-    let spacing = edge.cells().spacing;
-    let continuum =
-        places
-            .iter()
-            .map(|x| (x - edge.cells().low) / spacing)
-            .map(|cells| match cells >= 0.0 {
-                true => heights.get(cells as usize).copied().unwrap_or(0.0),
-                false => heights.first().copied().unwrap_or(0.0),
-            });
-    let continuum: Vec<f64> = continuum.collect();
-    // Height to which the material lies behind the handshake surface over each place.
-    let surface = edge.handshake();
+    let continuum = places.iter().map(|x| zone.continuum_height(*x)).collect();
+    // Height to which the material lies behind a handshake surface over each place.
+    let behind = |edge: &MaterialEdge, x: f64| {
+        let at = edge.spec().side.along(x);
+        let rows = edge.handshake().iter().filter(|place| **place < at).count();
+        rows as f64 * edge.cells().spacing
+    };
     let handshake = places.iter().zip(&deposit).map(|(x, h)| {
-        let rows = surface.iter().filter(|place| *place < x).count();
-        (rows as f64 * spacing).min(*h)
+        let heights = zone.edges().iter().map(|edge| behind(edge, *x));
+        heights.fold(f64::INFINITY, f64::min).min(*h)
     });
     let handshake = handshake.collect();
-    let fields = edge.collapse().fields();
+    let cells = zone.edges().iter().flat_map(MaterialEdge::fields);
+    let fields: Vec<_> = cells.map(|(cell, _)| cell).collect();
     let middle = |c: &colluvium_continuum::free_surface::CellFields, axis: usize| {
         0.5 * (c.lower[axis] + c.upper[axis])
     };
-    let across =
-        |c: &colluvium_continuum::free_surface::CellFields| edge.cells().low + middle(c, 0);
-    debug_assert_eq!(xs.len(), heights.len());
     vec![
         Table::new("sides")
             .with("x", "m", places)
@@ -454,7 +512,7 @@ fn sides(
             .with("continuum", "m", continuum)
             .with("handshake", "m", handshake),
         Table::new("continuum")
-            .with("x", "m", fields.iter().map(across).collect())
+            .with("x", "m", fields.iter().map(|c| middle(c, 0)).collect())
             .with("z", "m", fields.iter().map(|c| middle(c, 1)).collect())
             .with("fraction", "1", fields.iter().map(|c| c.fraction).collect())
             .with("u", "m/s", fields.iter().map(|c| c.velocity[0]).collect())
@@ -466,15 +524,27 @@ fn sides(
 }
 
 /// Moves of the edge with their reasons, in a table and in words.
-fn moves(place: f64, edge: &MaterialEdge, summary: &mut Summary) -> Option<Table> {
-    let all = edge.moves();
-    let inwards = all.iter().filter(|m| m.mass > 0.0).count();
+fn moves(zone: &GrainZone, summary: &mut Summary) -> Option<Table> {
+    let edges = zone.edges();
+    let of_edge = |edge: &'_ MaterialEdge| -> Vec<(usize, f64, Move)> {
+        let spec = edge.spec();
+        let number = usize::from(spec.side == Side::Above);
+        let moves = edge.moves().iter();
+        moves
+            .map(|m| (number, spec.side.along(spec.place + m.edge), *m))
+            .collect()
+    };
+    let mut all: Vec<_> = edges.iter().flat_map(of_edge).collect();
+    // In one exchange the lower edge moves first.
+    all.sort_by(|a, b| a.2.time.total_cmp(&b.2.time));
+    let inwards = all.iter().filter(|(.., m)| m.mass > 0.0).count();
     let sum = |sign: f64| {
-        let of = all.iter().map(|m| m.mass * sign);
+        let of = all.iter().map(|(.., m)| m.mass * sign);
         of.filter(|m| *m > 0.0).sum::<f64>()
     };
+    let subject = if edges.len() > 1 { "edges" } else { "edge" };
     summary.remarks.push(format!(
-        "The edge moved {} times ({} by {}, {} by {}): {:.3} kg became continuum and {:.3} kg grains again; {} moves inwards were refused by \
+        "The {subject} moved {} times ({} by {}, {} by {}): {:.3} kg became continuum and {:.3} kg grains again; {} moves inwards were refused by \
          zones.budget, and {} grains were laid on top because their place was taken.",
         all.len(),
         inwards,
@@ -483,18 +553,23 @@ fn moves(place: f64, edge: &MaterialEdge, summary: &mut Summary) -> Option<Table
         Reason::Rest.word(),
         sum(-1.0),
         sum(1.0),
-        edge.refused_moves(),
-        edge.displaced()
+        edges.iter().map(MaterialEdge::refused_moves).sum::<f64>(),
+        edges.iter().map(MaterialEdge::displaced).sum::<f64>()
     ));
     let reason = |m: &Move| match m.mass > 0.0 {
         true => Reason::Speed,
         false => Reason::Rest,
     };
-    let column = |f: fn(&Move) -> f64| all.iter().map(f).collect::<Vec<f64>>();
-    let reasons = all.iter().map(|m| reason(m).number() as f64).collect();
-    let places = all.iter().map(|m| place + m.edge).collect();
+    let column = |f: fn(&Move) -> f64| all.iter().map(|(.., m)| f(m)).collect::<Vec<f64>>();
+    let reasons = all
+        .iter()
+        .map(|(.., m)| reason(m).number() as f64)
+        .collect();
+    let places = all.iter().map(|(_, place, _)| *place).collect();
+    let sides = all.iter().map(|(side, ..)| *side as f64).collect();
     let table = Table::new("moves")
         .with("t", "s", column(|m| m.time))
+        .with("side", "1", sides)
         .with("edge", "m", places)
         .with("reason", "1", reasons)
         .with("speed", "m/s", column(|m| m.speed))

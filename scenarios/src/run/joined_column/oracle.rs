@@ -38,7 +38,9 @@ pub(super) fn survey(scene: &CollapseScene, origin: &str) -> Result<Option<Surve
         return Ok(None);
     };
     let column = JoinedColumn::new(scene, origin);
-    let spec = column.spec(DENSE)?;
+    let Some(spec) = column.specs(DENSE)?.into_iter().next() else {
+        return Ok(None);
+    };
     let case = CollapseCase {
         cells: (scene.cells() / COARSER).max(FEWEST),
         ..spec.case

@@ -2,28 +2,26 @@
 
 use crate::run::surface_fields::{SurfaceFields, field};
 use crate::vtkhdf::{Cells, Frame, Values};
-use colluvium_coupling::overlap::material_edge::MaterialEdge;
+use colluvium_coupling::overlap::material_edge::GrainZone;
 
 /// Cells of the continuum as quadrilaterals in the plane y = 0, in the coordinates of its grains; `counted` is 1 where totals
-/// count it, behind the handshake surface, and 0 in its copy of the grains. It is what the last exchange left.
-pub(super) fn cells(edge: &MaterialEdge, time: f64) -> Frame {
-    let mut cells = edge.collapse().fields();
-    let grid = edge.cells();
-    for cell in &mut cells {
-        cell.lower[0] += grid.low;
-        cell.upper[0] += grid.low;
+/// count it, behind the handshake surface, and 0 in its copy of the grains; `edge` is the number of the edge that it belongs to,
+/// along x from 0. It is what the last exchange left.
+pub(super) fn cells(zone: &GrainZone, time: f64) -> Frame {
+    let (mut cells, mut counted, mut edges) = (Vec::new(), Vec::new(), Vec::new());
+    for (number, edge) in zone.edges().iter().enumerate() {
+        for (cell, is_counted) in edge.fields() {
+            cells.push(cell);
+            counted.push(i64::from(is_counted));
+            edges.push(number as i64);
+        }
     }
-    let handshake = edge.handshake();
-    let counted = cells.iter().map(|cell| {
-        let row = (cell.lower[1] / grid.spacing).round() as usize;
-        let middle = 0.5 * (cell.lower[0] + cell.upper[0]);
-        i64::from(handshake.get(row).is_none_or(|place| middle < *place))
-    });
-    let counted = Values::Counts(counted.collect());
-    let law = &edge.spec().case.rheology;
+    // Both continua are of one material.
+    let law = zone.edges().first().map(|edge| edge.spec().case.rheology);
+    let inertia = law.map_or(0.0, |law| law.diameter * law.grain_density.sqrt());
     let fields = SurfaceFields {
         cells: &cells,
-        inertia: law.diameter * law.grain_density.sqrt(),
+        inertia,
         others: 0,
     };
     let mut frame = Frame {
@@ -32,6 +30,9 @@ pub(super) fn cells(edge: &MaterialEdge, time: f64) -> Frame {
         points: fields.quadrilaterals().collect(),
         fields: fields.of_plane(),
     };
-    frame.fields.push(field("counted", "1", counted));
+    for (name, values) in [("counted", counted), ("edge", edges)] {
+        let values = Values::Counts(values);
+        frame.fields.push(field(name, "1", values));
+    }
     frame
 }
