@@ -9,6 +9,7 @@
 
 use super::faces::{ACTIVE, ALIKE, Face, Faces, weight_onto};
 use super::fraction::volume_in;
+use super::ground::shores::Shores;
 use super::open_ends::Inflow;
 use super::outside::Outside;
 use super::plane::Plane;
@@ -46,6 +47,8 @@ pub(crate) struct Material<'a, const D: usize = DIMENSIONS, const C: usize = COM
     pub topology: &'a Topology<D>,
     pub fractions: &'a [f64],
     pub planes: &'a [Option<Plane>],
+    /// The surface where it meets ground.
+    pub shores: &'a Shores,
     pub faces: &'a Faces<D>,
     /// Walls beside the plane, which rub.
     pub side_walls: Option<SideWalls>,
@@ -131,7 +134,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
 
     /// The surface in a cell. In space dust has none: where some of it lies is a matter of round-off.
     fn plane(&self, cell: usize) -> Option<&Plane> {
-        let plane = self.planes[cell].as_ref();
+        let plane = self.shores.plane(cell).or(self.planes[cell].as_ref());
         plane.filter(|_| D == 2 || self.fractions[cell] > EMPTY)
     }
 
