@@ -25,6 +25,8 @@ use crate::wall_friction::{PointLaw, SideWalls};
 
 /// Smallest θ in the pressure gradient and in the pressure at walls.
 const NEAREST_SURFACE: f64 = 0.005;
+/// Largest θ there, along a level surface over ground.
+const FARTHEST_SURFACE: f64 = 1e15;
 /// Smallest θ in the extrapolation of pressure beyond the surface.
 pub(super) const NEAREST_EXTRAPOLATION: f64 = 0.25;
 /// An axis along which gravity has less than this part of all of it lies across upright faces.
@@ -159,6 +161,9 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         };
         if inner <= 0.0 {
             NEAREST_SURFACE
+        } else if outer >= 0.0 && self.faces.shares.is_some() {
+            // The centre of a cell that holds little above ground: the pressure goes on to it as the depth does.
+            inner / (inner - outer).max(inner / FARTHEST_SURFACE)
         } else if outer >= 0.0 {
             1.0
         } else {
