@@ -56,9 +56,7 @@ impl Shores {
                 continue;
             };
             let around = Neighbourhood::around(topology, fractions, cell);
-            let is_dry = |at: usize| ground.solid[at] > 0.0 && fractions[at] <= DUST;
-            if (ground.solid[cell] > 0.0 || around.any(is_dry))
-                && ground.miss(&around, plane, EXACT) > EXACT
+            if around.any(|at| ground.solid[at] > 0.0) && ground.miss(&around, plane, EXACT) > EXACT
             {
                 self.cells.push((cell, *plane));
             }
