@@ -22,7 +22,7 @@ mod cylinder_of_grains;
 pub mod energy_table;
 pub mod grain_table;
 mod grains;
-mod heap;
+pub(crate) mod heap;
 pub mod impact;
 pub mod impact_scales;
 pub mod incline;

@@ -3,6 +3,7 @@
 //! A suite is a function from a directory to [`Check`]s: it runs its cases into the directory (what is finished there
 //! is not run again) and says what it compares with what. Adding a suite = one file and one line in [`SUITES`].
 
+mod column;
 mod incline;
 mod overlap;
 
@@ -102,6 +103,11 @@ pub const SUITES: &[Suite] = &[
         name: "overlap",
         about: "a slope as grains, as continuum and as both joined, with a joint that exchanges nothing as the control",
         run: overlap::run,
+    },
+    Suite {
+        name: "column",
+        about: "a column that collapses as grains, as continuum and as both joined: parts of law, mesh, coupling and packing, with a joint that exchanges nothing as the control",
+        run: column::run,
     },
 ];
 

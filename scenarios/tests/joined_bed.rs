@@ -288,6 +288,16 @@ fn bad_joined_beds_are_refused_by_key() {
             "zones.misplaced_shear",
         ),
         (
+            &["zones.loosest_scaled=0.9"],
+            "zones.loosest_scaled",
+            "zones.moving = true",
+        ),
+        (
+            &["zones.moving=true", "zones.warmest_share=0"],
+            "zones.warmest_share",
+            "(0",
+        ),
+        (
             &["zones.moving=true", "zones.sheared_grains=200"],
             "zones.sheared_grains",
             "zones.returning",

@@ -348,3 +348,42 @@ fn the_oracle_puts_the_edge() {
     assert!(predicted(&poor) < predicted(&strict), "{poor}");
     assert!(!folder.path().join("x").exists());
 }
+
+/// The suite tells law, mesh, coupling and packing apart, and its control fails. Columns this small miss its limits by what their
+/// packings differ by, which it says by its exit.
+#[test]
+fn a_suite_parts_the_errors_of_a_joined_column() {
+    let folder = tempfile::tempdir().unwrap();
+    let mut list = vec!["validate", "column", "--out", "suite", "--threads", "1"];
+    let small = SMALL_JOINED_COLUMN
+        .iter()
+        .filter(|set| !set.starts_with("model") && !set.starts_with("grains.packing"));
+    for set in small.chain(&["grid.length_scaled=5", "grains.stiffness_scaled=1e3"]) {
+        list.extend(["--set", set]);
+    }
+    colluvium(folder.path(), &list);
+    let file = folder.path().join("suite/checks.json");
+    let checks: Vec<serde_json::Value> =
+        serde_json::from_slice(&std::fs::read(file).unwrap()).unwrap();
+    let figures = |case: &str| -> Vec<f64> {
+        let own = checks.iter().filter(|c| c["case"] == case);
+        own.map(|c| c["value"].as_f64().unwrap()).collect()
+    };
+    for check in &checks {
+        println!("{} {} {}", check["case"], check["what"], check["value"]);
+    }
+    // Deposits: of the joined column nearer to the grains' than twice what two packings differ by and than 6 %.
+    let deposit = |case: &str| figures(case)[1];
+    assert!(deposit("hybrid") < 0.06 && deposit("hybrid") < 2.0 * deposit("grains"));
+    // What differs in one thing only differs in something, and by no more than the whole may be off.
+    for part in [
+        "hybrid, cells half as wide",
+        "hybrid, overlap 1.5 times as wide",
+        "hybrid, mu_s and mu_2 an error higher",
+    ] {
+        assert!(deposit(part) > 1e-6 && deposit(part) < 0.06, "{part}");
+    }
+    assert_eq!(figures("uncoupled"), [1.0]);
+    let report = std::fs::read_to_string(folder.path().join("suite/report.html")).unwrap();
+    assert!(report.contains("other packing") && report.contains("nothing exchanged"));
+}

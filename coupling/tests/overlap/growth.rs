@@ -147,6 +147,8 @@ pub(super) fn spec(simulation: &mut Simulation, travel: Travel, misplaced: f64) 
             travel,
             near: 3.0,
             fastest: f64::INFINITY,
+            loosest: 0.0,
+            warmest: f64::INFINITY,
             misplaced,
         }),
     }
@@ -564,4 +566,72 @@ fn the_joint_knows_what_it_does_to_the_energy_of_grains() {
     assert!(miss.abs() < 0.08 * sizes, "{miss} {sizes}");
     assert!(monitors.work[1] < 0.0, "an impedance absorbs");
     assert!(monitors.temperatures().iter().all(|t| *t > 0.0));
+}
+
+/// A box that watches how dilute the grains of its inner overlaps are goes outwards where they are loose or warm, and stays
+/// where they rest, or move as one as fast as the warm ones do.
+#[test]
+fn loose_and_warm_grains_move_the_box() {
+    #[derive(Clone, Copy, PartialEq)]
+    enum Case {
+        Rest,
+        Loose,
+        Warm,
+        AsOne,
+    }
+    const SPEED: f64 = 0.5;
+    let run = |case: Case| {
+        let mut whole = rested();
+        let mut spec = spec(&mut whole, TRAVEL, f64::INFINITY);
+        if let Some(growth) = &mut spec.growth {
+            (growth.loosest, growth.warmest) = (0.9, 0.001);
+        }
+        // Before what is warm has cooled, and before waves come from the walls.
+        spec.settings.exchange_time = spec.settings.load_time;
+        let mut grains = whole.grain_list();
+        if case == Case::Loose {
+            let mut number = 0;
+            // Every fourth of those inside the inner overlap at high x and before it.
+            grains.retain(|g| {
+                number += usize::from((13.0..20.0).contains(&g.position.x));
+                !(13.0..20.0).contains(&g.position.x) || number % 4 != 0
+            });
+        }
+        for (number, grain) in grains.iter_mut().enumerate() {
+            let sign = |bit: usize| if (number >> bit) & 1 == 0 { 1.0 } else { -1.0 };
+            let each = SPEED / 3.0_f64.sqrt();
+            grain.velocity = match case {
+                Case::Warm => each * Vector3::new(sign(0), sign(1), sign(2)),
+                Case::AsOne => SPEED * Vector3::x(),
+                _ => Vector3::zeros(),
+            };
+        }
+        let mut simulation = match case {
+            Case::Rest => whole,
+            _ => Simulation::new(setup(grains)).unwrap(),
+        };
+        let mut bowl = Bowl::cut(spec, &mut simulation).unwrap();
+        let each = Bowl::steps_of_loads(&bowl.spec().settings, simulation.timestep());
+        let mut exchanges = 0;
+        while bowl.moves().is_empty() && exchanges < 2 {
+            for _ in 0..each {
+                bowl.see_step(&simulation);
+                simulation.advance(1).unwrap();
+            }
+            bowl.go_on(&mut simulation).unwrap();
+            exchanges += usize::from(bowl.at_exchange());
+        }
+        let found = bowl.moves().first().map(|m| (m.reason, m.value, m.side));
+        println!("{found:?}");
+        found
+    };
+    assert_eq!(run(Case::Rest), None);
+    assert_eq!(run(Case::AsOne), None);
+    let (reason, packing, side) = run(Case::Loose).unwrap();
+    assert_eq!((reason, side), (Reason::Loose, RIGHT));
+    assert!((0.65..0.88).contains(&packing), "{packing}");
+    let (reason, share, _) = run(Case::Warm).unwrap();
+    assert_eq!(reason, Reason::Warm);
+    // ρ v²/3 = 0.05 at the start under a mean pressure of some 3.
+    assert!((0.001..0.05).contains(&share), "{share}");
 }

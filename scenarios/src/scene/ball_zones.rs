@@ -80,6 +80,16 @@ pub struct BallZoneKeys {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
     pub fastest_inertial: Option<f64>,
+    /// Solid fraction of the grains in the inner overlap of a side of a moving box, over that of the bed, below which the side goes
+    /// outwards. Left out: none does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+    pub loosest_scaled: Option<f64>,
+    /// Part of the pressure there that fluctuations of velocity make (kinetic over whole pressure) above which the side goes
+    /// outwards. Left out: none does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 100.0))]
+    pub warmest_share: Option<f64>,
     /// Shear of what is stored beside a side of a moving box, since it was put by, above which the side goes outwards. Left out:
     /// none is.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -139,6 +149,8 @@ impl Default for BallZoneKeys {
             hold_scaled: holds(),
             budget: None,
             fastest_inertial: None,
+            loosest_scaled: None,
+            warmest_share: None,
             misplaced_shear: None,
             returning: None,
             sheared_inertial: None,
@@ -295,6 +307,8 @@ impl BallImpactScene {
             },
             near: self.near_diameters() * diameter,
             fastest: zones.fastest_inertial.unwrap_or(valid),
+            loosest: zones.loosest_scaled.unwrap_or(0.0),
+            warmest: zones.warmest_share.unwrap_or(f64::INFINITY),
             misplaced: zones.misplaced_shear.unwrap_or(f64::INFINITY),
         })
     }
@@ -375,6 +389,8 @@ impl BallImpactScene {
         }
         let given = [
             ("fastest_inertial", zones.fastest_inertial.is_some()),
+            ("loosest_scaled", zones.loosest_scaled.is_some()),
+            ("warmest_share", zones.warmest_share.is_some()),
             ("misplaced_shear", zones.misplaced_shear.is_some()),
             ("returning", zones.returning.is_some()),
         ];

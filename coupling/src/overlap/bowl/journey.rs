@@ -15,6 +15,10 @@ pub struct Growth {
     pub near: f64,
     /// I of the continuum beside a side above which it moves outwards; infinite: none does.
     pub fastest: f64,
+    /// Solid fraction of the grains in a side's inner overlap over the bed's below which it moves outwards; 0: none does.
+    pub loosest: f64,
+    /// Part of the pressure there that fluctuations of velocity make above which it moves outwards; infinite: none does.
+    pub warmest: f64,
     /// Shear of what is stored above which it is misplaced: a side moves outwards before it, and sheared packings take its
     /// place; infinite: nothing is.
     pub misplaced: f64,
@@ -35,17 +39,23 @@ pub enum Reason {
     Inertial,
     /// What is stored beside it has been sheared since: with its shear.
     Misplaced,
+    /// The grains of its inner overlap are packed loosely: with their solid fraction over the bed's.
+    Loose,
+    /// Fluctuations make much of the pressure there: with their share.
+    Warm,
 }
 
 impl Reason {
     /// All of them, by their numbers.
-    pub const ALL: [Reason; 6] = [
+    pub const ALL: [Reason; 8] = [
         Reason::Ball,
         Reason::Speed,
         Reason::Rest,
         Reason::Asked,
         Reason::Inertial,
         Reason::Misplaced,
+        Reason::Loose,
+        Reason::Warm,
     ];
 
     /// Its number in tables.
@@ -55,7 +65,17 @@ impl Reason {
 
     /// Its name.
     pub fn word(self) -> &'static str {
-        ["ball", "speed", "rest", "asked", "inertial", "misplaced"][self as usize]
+        let words = [
+            "ball",
+            "speed",
+            "rest",
+            "asked",
+            "inertial",
+            "misplaced",
+            "loose",
+            "warm",
+        ];
+        words[self as usize]
     }
 }
 
@@ -70,7 +90,7 @@ pub struct Move {
     pub place: f64,
     /// Why.
     pub reason: Reason,
-    /// The distance (m), speed (m/s), inertial number or shear that was the reason.
+    /// The distance (m), speed (m/s), inertial number, shear or share that was the reason.
     pub value: f64,
     /// Mass that became grains; negative: that became continuum (kg).
     pub mass: f64,

@@ -19,6 +19,7 @@ mod account;
 mod cells;
 mod continuum;
 mod copy;
+mod dilute;
 mod exchange;
 mod gradients;
 mod growth;

@@ -4,6 +4,7 @@
 //!
 //! - the ball has come nearer to the inner end of its overlap than asked for;
 //! - the grains of its inner overlap, their rms speed with its fluctuations, are faster than v_wake;
+//! - those grains are packed more loosely than φ_min, or fluctuations make more of the pressure than a share p_k/p ([`dilute`]);
 //! - a tenth of the continuum in the strip beyond it is sheared faster than its law was calibrated for, I > I_max;
 //! - what is stored in that strip has been sheared by more than γ_max in the mean since it was put by, so that the law's steady
 //!   friction no longer is that of material as it was put by.
@@ -11,6 +12,8 @@
 //! It goes *inwards* where the grains that would be continuum or overlap have been slower than v_rest < v_wake for a time while
 //! others beyond are faster, nothing asks for a move outwards, and the ball is far. Each move outwards of a side doubles the time
 //! that its next one inwards waits for. A move that the budget does not allow is counted once until it is no longer wanted.
+//!
+//! [`dilute`]: super::dilute
 
 use super::gradients::shear_rate;
 use super::journey::{Growth, Reason};
@@ -22,7 +25,7 @@ use colluvium_dem::{GrainSample, Simulation};
 /// Part of the strip beyond a side that may exceed the I that it is judged by.
 const EXCEEDED: f64 = 0.1;
 /// Pressure below which I is taken at it, in weights of a layer of cells.
-const LEAST_PRESSURE: f64 = 0.5;
+pub(super) const LEAST_PRESSURE: f64 = 0.5;
 
 /// What the grains beside a side do.
 #[derive(Clone, Copy, Debug, Default)]
@@ -52,6 +55,7 @@ impl Bowl {
         let needs = near.map(|way| (Reason::Ball, way));
         let needs =
             needs.or_else(|| (beside.inner > travel.wake).then_some((Reason::Speed, beside.inner)));
+        let needs = needs.or_else(|| self.needs_dilute(growth, &side));
         if let Some(reason) = needs.or_else(|| self.needs_beyond(growth, &side)) {
             self.journey.resting[number] = 0.0;
             let refused = !self.shift(growth, side, true, reason, simulation)?;
@@ -116,6 +120,16 @@ impl Bowl {
             front: speed(2),
             count,
         }
+    }
+
+    /// What of the grains in the inner overlap of a side no dense continuum beside them can be.
+    fn needs_dilute(&self, growth: &Growth, side: &Side) -> Option<(Reason, f64)> {
+        if growth.loosest <= 0.0 && growth.warmest.is_infinite() {
+            return None;
+        }
+        let found = self.dilution_beside(side)?;
+        let loose = (found.packing < growth.loosest).then_some((Reason::Loose, found.packing));
+        loose.or_else(|| (found.kinetic > growth.warmest).then_some((Reason::Warm, found.kinetic)))
     }
 
     /// What in the continuum beyond a side, a strip wide, asks for grains.

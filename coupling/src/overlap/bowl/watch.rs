@@ -37,6 +37,13 @@ impl Bowl {
         sum
     }
 
+    /// Velocity of a grain less the mean velocity of the cells around it, v′ (m/s).
+    pub(super) fn fluctuation(&self, grain: &GrainSample) -> Vector3<f64> {
+        let hats = self.layout.cells.hats(&grain.position).into_iter();
+        let mean = hats.map(|(cell, hat)| hat * self.sums.cover[cell].velocity());
+        grain.velocity - mean.sum::<Vector3<f64>>()
+    }
+
     /// Granular temperature ⟨v′²⟩/3 about the mean velocity of the cells around each grain: of the buffer, of the inner overlap,
     /// and of grains beyond it up to its width (m²/s²).
     fn temperatures(&self) -> [f64; 3] {
@@ -50,10 +57,7 @@ impl Bowl {
             let Some(zone) = ends.iter().position(|end| label < *end) else {
                 continue;
             };
-            let hats = cells.hats(&grain.position).into_iter();
-            let mean = hats.map(|(cell, hat)| hat * self.sums.cover[cell].velocity());
-            let about = grain.velocity - mean.sum::<Vector3<f64>>();
-            sums[zone][0] += grain.mass * about.norm_squared() / 3.0;
+            sums[zone][0] += grain.mass * self.fluctuation(grain).norm_squared() / 3.0;
             sums[zone][1] += grain.mass;
         }
         sums.map(|[energy, mass]| if mass > 0.0 { energy / mass } else { 0.0 })

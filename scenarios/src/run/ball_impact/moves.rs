@@ -25,6 +25,8 @@ pub(super) fn table(bowl: &Bowl, summary: &mut Summary) -> Option<Table> {
     let reasons = [
         Reason::Ball,
         Reason::Speed,
+        Reason::Loose,
+        Reason::Warm,
         Reason::Inertial,
         Reason::Misplaced,
         Reason::Rest,
