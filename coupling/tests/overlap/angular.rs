@@ -151,8 +151,8 @@ fn a_bowl_keeps_all_three() {
     bed.advance(2.0, 1.0);
     let moves = bed.bowl.moves().len();
     println!("{moves} moves");
-    let entries = ["weight", "traction", "relaxation", "handed"];
-    let entries = &entries[..if moves > 0 { 4 } else { 3 }];
+    let entries = ["weight", "traction", "relaxation", "moments", "handed"];
+    let entries = &entries[..if moves > 0 { 5 } else { 4 }];
     closes(
         bed.bowl.angular_book().unwrap(),
         &bed.simulation,

@@ -110,6 +110,11 @@ pub struct ColumnOverlapKeys {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
     pub relaxation_time: Option<f64>,
+    /// Time in which mean spins in the buffer relax to half of the curl of the continuum's velocity (s); left out, √(d/g), of an
+    /// impact as long as the others.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
+    pub spin_time: Option<f64>,
     /// Time in which the continuum follows the grains in the inner overlap (s).
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
@@ -159,6 +164,7 @@ impl ColumnOverlapKeys {
             shell,
             stress_time: self.stress_time,
             relaxation_time: self.relaxation_time.or(soon),
+            spin_time: self.spin_time,
             following_time: self.following_time.or(soon),
             exchange_time: self.exchange_time,
             load_time: self.load_time,
@@ -175,7 +181,7 @@ impl ColumnOverlapKeys {
 pub fn overlap_words(s: &Resolved, d: f64) -> String {
     format!(
         "overlap.width {:.4} m, of which shell {:.1} d, buffer {:.1} d (the shell in it), inner overlap {:.1} d; loads held {:.2e} s, exchange every {:.2e} s, stresses averaged over \
-         {:.2e} s, relaxation {:.2e} s, following {:.2e} s, impedance {:.3e} Pa s/m",
+         {:.2e} s, relaxation {:.2e} s, of spins {:.2e} s, following {:.2e} s, impedance {:.3e} Pa s/m",
         s.inner + s.buffer,
         s.shell / d,
         s.buffer / d,
@@ -184,6 +190,7 @@ pub fn overlap_words(s: &Resolved, d: f64) -> String {
         s.exchange_time,
         s.stress_time,
         s.relaxation_time,
+        s.spin_time,
         s.following_time,
         s.impedance
     )

@@ -2,6 +2,7 @@
 
 use super::cells::over;
 use super::continuum::{components, sideways};
+use super::gradients::{gradient, rotation};
 use super::{Bowl, OverlapError};
 use crate::overlap::angular::{AngularBook, Counterpart, Parts};
 use colluvium_dem::{GrainSample, Load, Simulation};
@@ -33,6 +34,11 @@ pub struct Scratch {
     near: Vec<GrainSample>,
     pub(super) shell: Vec<Shell>,
     loads: Vec<Load>,
+}
+
+/// Moment of inertia of a ball (kg m²).
+fn inertia(grain: &GrainSample) -> f64 {
+    0.4 * grain.mass * grain.radius * grain.radius
 }
 
 impl Bowl {
@@ -69,6 +75,9 @@ impl Bowl {
         }
         for (sum, force) in self.given.relaxation.iter_mut().zip(&self.laid.relaxation) {
             *sum += force * time;
+        }
+        for (sum, moment) in self.given.spin.iter_mut().zip(&self.laid.spin) {
+            *sum += moment * time;
         }
         self.given.traction += self.laid.traction * time;
         self.given.impedance += self.laid.impedance * time;
@@ -147,23 +156,28 @@ impl Bowl {
                 }
             }
             let traction = force;
+            let inertia = inertia(grain);
+            let mut moment = Vector3::zeros();
             for (cell, hat) in cells.hats(&grain.position) {
                 let pull = grain.mass * hat * self.held.accelerations[cell];
+                let turn = inertia * hat * self.held.spins[cell];
                 self.laid.relaxation[cell] += pull;
+                self.laid.spin[cell] += turn;
                 force += pull;
+                moment += turn;
             }
-            power += (force - traction).dot(&grain.velocity);
-            if force != Vector3::zeros() {
+            power += (force - traction).dot(&grain.velocity) + moment.dot(&grain.spin);
+            if force != Vector3::zeros() || moment != Vector3::zeros() {
                 scratch.loads.push(Load {
                     grain: grain.id,
                     force,
-                    moment: Vector3::zeros(),
+                    moment,
                 });
                 if let Some(book) = &mut angular {
                     let parts = Parts {
                         traction,
                         relaxation: force - traction,
-                        ..Parts::default()
+                        moment,
                     };
                     book.lay(grain.id, parts);
                 }
@@ -231,6 +245,32 @@ impl Bowl {
         answer
     }
 
+    /// The continuum has no spin: it takes the opposite of the couples that turned the grains of a cell as forces on the six
+    /// cells around it,
+    ///
+    /// ```text
+    /// f(± e_a) = ± K × e_a / (4 h_a),        Σ f = 0,  Σ r × f = K,
+    /// ```
+    /// K the couple's impulse (N m s), h_a spacing along axis a (m). At the ends of the grid there is nothing to take them.
+    pub(super) fn answer_couples(&mut self) {
+        let cells = &self.layout.cells;
+        for (cell, given) in self.given.spin.iter().enumerate() {
+            let index = cells.index(cell);
+            let is_inside = (0..3).all(|a| index[a] > 0 && index[a] + 1 < cells.counts[a]);
+            if *given == Vector3::zeros() || !is_inside {
+                continue;
+            }
+            for axis in 0..3 {
+                let arm = Vector3::ith(axis, 0.25 / cells.spacing[axis]);
+                let force = -given.cross(&arm);
+                let (mut low, mut high) = (index, index);
+                (low[axis], high[axis]) = (index[axis] - 1, index[axis] + 1);
+                self.owed[cells.cell(high)] += force;
+                self.owed[cells.cell(low)] -= force;
+            }
+        }
+    }
+
     /// Averages of the grains to the continuum, its step, and what it does to the grains until the next exchange.
     fn exchange(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
         let dt = self.exchange_time();
@@ -239,6 +279,7 @@ impl Bowl {
         for (owed, given) in self.owed.iter_mut().zip(&self.given.relaxation) {
             *owed -= given;
         }
+        self.answer_couples();
         self.bear();
         self.watch_impulses();
         self.account.traction += self.given.traction;
@@ -345,6 +386,7 @@ impl Bowl {
         let [handshake, inner] = self.layout.widths;
         for cover in &mut self.sums.cover {
             (cover.buffer, cover.buffer_slip) = (0.0, Vector3::zeros());
+            (cover.turning, cover.spin) = (0.0, Vector3::zeros());
             (cover.inner, cover.inner_slip) = (0.0, Vector3::zeros());
         }
         let belongs = self.spec.belongs();
@@ -368,21 +410,36 @@ impl Bowl {
                 };
                 *sum += mass;
                 *slips += mass * slip;
+                if label < handshake {
+                    let turning = inertia(grain) * hat;
+                    cover.turning += turning;
+                    cover.spin += turning * grain.spin;
+                }
             }
         }
     }
 
-    /// Takes the continuum's traction, and forms the accelerations that bring mean velocities together.
+    /// Takes the continuum's traction, and forms the accelerations that bring mean velocities together, and mean spins
+    /// to half of the curl.
     pub(super) fn agree(&mut self) {
         self.slips();
         let dt = self.exchange_time();
-        let rate = (dt / self.spec.settings.relaxation_time).min(1.0) / dt;
+        let towards = |time: f64| (dt / time).min(1.0) / dt;
+        let rate = towards(self.spec.settings.relaxation_time);
+        let turn = towards(self.spec.settings.spin_time);
         let full = self.full();
         for cell in 0..self.layout.cells.count() {
             let cover = &self.sums.cover[cell];
             let holds = self.view.is_full(cell) && cover.buffer > LEAST_BUFFER * full;
             self.held.accelerations[cell] = match holds {
                 true => rate * cover.buffer_slip / cover.buffer,
+                false => Vector3::zeros(),
+            };
+            self.held.spins[cell] = match holds {
+                true => {
+                    let material = rotation(&gradient(&self.view, &self.layout.cells, cell));
+                    turn * (material - cover.spin / cover.turning)
+                }
                 false => Vector3::zeros(),
             };
         }

@@ -13,7 +13,7 @@ use colluvium_continuum::free_surface::SpaceState;
 use colluvium_dem::Simulation;
 use nalgebra::{Matrix3, Vector3};
 
-/// Numbers in front but for the two rows of forces by cell, the account among them.
+/// Numbers in front but for the four rows of forces and moments by cell, the account among them.
 const FRONT: usize = 4 + 12 + 6 + account::NUMBERS;
 
 /// Vectors one behind the other.
@@ -30,7 +30,7 @@ impl Bowl {
     /// What every load changes.
     fn front(&self) -> Vec<f64> {
         let cells = self.layout.cells.count();
-        let mut front = Vec::with_capacity(FRONT + 6 * cells);
+        let mut front = Vec::with_capacity(FRONT + 12 * cells);
         front.extend([
             cells as f64,
             self.made as f64,
@@ -43,8 +43,10 @@ impl Bowl {
         front.extend(self.monitors.work);
         front.extend(self.laid.powers);
         front.extend(self.account.numbers());
-        front.extend(flat(&self.laid.relaxation));
-        front.extend(flat(&self.given.relaxation));
+        for given in [&self.laid, &self.given] {
+            front.extend(flat(&given.relaxation));
+            front.extend(flat(&given.spin));
+        }
         front
     }
 
@@ -75,6 +77,7 @@ impl Bowl {
         put(&stress.collect::<Vec<f64>>());
         for row in [
             &self.held.accelerations,
+            &self.held.spins,
             &self.held.traction,
             &self.held.velocity,
             &self.owed,
@@ -146,6 +149,7 @@ struct Rows<'a> {
     strain: &'a [f64],
     stress: &'a [f64],
     accelerations: &'a [f64],
+    spins: &'a [f64],
     traction: &'a [f64],
     velocity: &'a [f64],
     owed: &'a [f64],
@@ -161,7 +165,7 @@ impl<'a> Rows<'a> {
     /// Of a memory; nothing if a row is missing or too short.
     fn of(memory: &'a [f64]) -> Option<Self> {
         let cells = *memory.first()? as usize;
-        let (front, mut rest) = memory.split_at_checked(FRONT + 6 * cells)?;
+        let (front, mut rest) = memory.split_at_checked(FRONT + 12 * cells)?;
         let mut take = || {
             let (length, after) = rest.split_first()?;
             let (row, after) = after.split_at_checked(*length as usize)?;
@@ -184,6 +188,7 @@ impl<'a> Rows<'a> {
             strain: take()?,
             stress: take()?,
             accelerations: take()?,
+            spins: take()?,
             traction: take()?,
             velocity: take()?,
             owed: take()?,
@@ -214,6 +219,7 @@ impl<'a> Rows<'a> {
             && self.strain.len() == 5 * cells
             && self.stress.len() == 6 * cells
             && self.accelerations.len() == 3 * cells
+            && self.spins.len() == 3 * cells
             && self.owed.len() == 3 * cells
             && self.traction.len() == 3 * faces
             && self.velocity.len() == 3 * faces
@@ -235,6 +241,7 @@ impl<'a> Rows<'a> {
             .map(|&[xx, yy, zz, xy, xz, yz]| Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
             .collect();
         bowl.held.accelerations = vectors(self.accelerations);
+        bowl.held.spins = vectors(self.spins);
         bowl.held.traction = vectors(self.traction);
         bowl.held.velocity = vectors(self.velocity);
         bowl.held.area = self.area.to_vec();
@@ -249,7 +256,9 @@ impl<'a> Rows<'a> {
         for (k, given) in [&mut bowl.laid, &mut bowl.given].into_iter().enumerate() {
             let pair = vectors(&scalars[4 + 6 * k..10 + 6 * k]);
             (given.traction, given.impedance) = (pair[0], pair[1]);
-            given.relaxation = vectors(&forces[3 * self.cells * k..3 * self.cells * (k + 1)]);
+            let row = |n: usize| &forces[3 * self.cells * n..3 * self.cells * (n + 1)];
+            given.relaxation = vectors(row(2 * k));
+            given.spin = vectors(row(2 * k + 1));
         }
         let mut account = [0.0; account::NUMBERS];
         account.copy_from_slice(&scalars[22..]);

@@ -223,6 +223,8 @@ impl BowlSpec {
 struct Held {
     /// Accelerations of mean velocities of the buffer, cell by cell (m/s²).
     accelerations: Vec<Vector3<f64>>,
+    /// Angular accelerations of their mean spins (rad/s²).
+    spins: Vec<Vector3<f64>>,
     /// Force of the continuum on each face of the box (N), the area it acts on (m²), and the continuum's velocity
     /// there (m/s).
     traction: Vec<Vector3<f64>>,
@@ -234,6 +236,8 @@ struct Held {
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Given {
     relaxation: Vec<Vector3<f64>>,
+    /// Moments of the relaxation of spins, by cell (N m, or N m s).
+    spin: Vec<Vector3<f64>>,
     traction: Vector3<f64>,
     impedance: Vector3<f64>,
     /// Powers of traction, impedance and relaxation when they were laid (W); of what is laid alone.
@@ -244,12 +248,14 @@ impl Given {
     fn nothing(cells: usize) -> Self {
         Self {
             relaxation: vec![Vector3::zeros(); cells],
+            spin: vec![Vector3::zeros(); cells],
             ..Self::default()
         }
     }
 
     fn clear(&mut self) {
         self.relaxation.fill(Vector3::zeros());
+        self.spin.fill(Vector3::zeros());
         (self.traction, self.impedance) = (Vector3::zeros(), Vector3::zeros());
         self.powers = [0.0; 3];
     }
@@ -387,6 +393,7 @@ impl Bowl {
             },
             held: Held {
                 accelerations: vec![Vector3::zeros(); count],
+                spins: vec![Vector3::zeros(); count],
                 ..Held::default()
             },
             laid: Given::nothing(count),

@@ -11,13 +11,16 @@ const LAYERS: usize = 14;
 const INSIDE: usize = 5;
 
 /// Grains on a cubic lattice with every third layer of x shifted up, which no mean is symmetric to.
-fn grains() -> Vec<Grain> {
+fn grains(spin: Vector3<f64>) -> Vec<Grain> {
     let place = |n: usize| {
         let (i, j, k) = (n / (WIDTH * LAYERS), n / LAYERS % WIDTH, n % LAYERS);
         let shift = 0.07 * (i % 3) as f64;
         Vector3::new(i as f64 + 0.5, j as f64 + 0.5, k as f64 + 0.45 + shift)
     };
-    let ball = |n| Grain::at_rest(place(n), 0.45 + 0.01 * (n % 5) as f64, 1.9);
+    let ball = |n| Grain {
+        spin,
+        ..Grain::at_rest(place(n), 0.45 + 0.01 * (n % 5) as f64, 1.9)
+    };
     (0..WIDTH * WIDTH * LAYERS).map(ball).collect()
 }
 
@@ -37,7 +40,7 @@ fn joined(rate: Vector3<f64>, drift: Vector3<f64>, ours: Vector3<f64>) -> Bowl {
         },
         gravity: -Vector3::z(),
         law: law.into(),
-        grains: grains(),
+        grains: grains(ours),
         walls: vec![Wall::plane(Vector3::zeros(), Vector3::z())],
         bodies: Vec::new(),
         timestep: 1e-3,
@@ -99,16 +102,19 @@ fn joined(rate: Vector3<f64>, drift: Vector3<f64>, ours: Vector3<f64>) -> Bowl {
     bowl
 }
 
-/// Largest acceleration of the relaxation, and slip of the shell on a face, below the surface.
-fn exchanged(bowl: &Bowl) -> [f64; 2] {
+/// Largest acceleration of the relaxation, angular acceleration of spins, and slip of the shell on a face, below the surface.
+fn exchanged(bowl: &Bowl) -> [f64; 3] {
     let cells = &bowl.layout.cells;
     let inside = |cell: usize| cells.index(cell)[2] < INSIDE;
-    let accelerations = bowl.held.accelerations.iter().enumerate();
-    let accelerations = accelerations.filter(|(cell, _)| inside(*cell));
+    let largest = |rows: &[Vector3<f64>]| {
+        let rows = rows.iter().enumerate().filter(|(cell, _)| inside(*cell));
+        rows.fold(0.0, |most: f64, (_, row)| most.max(row.norm()))
+    };
     let shells = bowl.faces.all.iter().zip(&bowl.scratch.shell);
     let slips = shells.filter(|(face, _)| inside(face.cells[0]));
     [
-        accelerations.fold(0.0, |most: f64, (_, a)| most.max(a.norm())),
+        largest(&bowl.held.accelerations),
+        largest(&bowl.held.spins),
         slips.fold(0.0, |most: f64, (_, s)| {
             most.max(over(s.slip, s.weight).norm())
         }),
@@ -123,9 +129,9 @@ fn what_moves_and_turns_as_one_exchanges_nothing() {
         (row(0.0, 0.0, 0.2), row(0.0, 0.0, 0.0)),
         (row(0.1, -0.3, 0.2), row(0.2, 0.1, -0.1)),
     ] {
-        let [acceleration, slip] = exchanged(&joined(rate, drift, rate));
-        println!("{rate:?} {drift:?}: {acceleration:.1e} {slip:.1e}");
-        assert!(acceleration < 1e-12 && slip < 1e-12);
+        let [acceleration, spin, slip] = exchanged(&joined(rate, drift, rate));
+        println!("{rate:?} {drift:?}: {acceleration:.1e} {spin:.1e} {slip:.1e}");
+        assert!(acceleration < 1e-12 && spin < 1e-12 && slip < 1e-12);
     }
 }
 
@@ -133,9 +139,30 @@ fn what_moves_and_turns_as_one_exchanges_nothing() {
 #[test]
 fn what_turns_at_another_rate_does() {
     let rate = Vector3::new(0.1, -0.3, 0.2);
-    let [acceleration, slip] = exchanged(&joined(rate, Vector3::zeros(), 1.1 * rate));
+    let [acceleration, spin, slip] = exchanged(&joined(rate, Vector3::zeros(), 1.1 * rate));
     assert!(
-        acceleration > 1e-2 && slip > 1e-2,
-        "{acceleration:e} {slip:e}"
+        acceleration > 1e-2 && spin > 1e-3 && slip > 1e-2,
+        "{acceleration:e} {spin:e} {slip:e}"
     );
+}
+
+/// The continuum takes a couple as forces that move nothing and turn as much the other way.
+#[test]
+fn a_couple_is_answered_by_forces_of_its_moment() {
+    let nothing = Vector3::zeros();
+    let mut bowl = joined(nothing, nothing, nothing);
+    let cells = bowl.layout.cells;
+    let couple = Vector3::new(0.3, -0.7, 0.2);
+    bowl.owed.fill(nothing);
+    bowl.given.spin.fill(nothing);
+    bowl.given.spin[cells.cell([4, 5, 3])] = couple;
+    // At the grid's end there is nothing to take one.
+    bowl.given.spin[cells.cell([0, 5, 3])] = couple;
+    bowl.answer_couples();
+    let force: Vector3<f64> = bowl.owed.iter().sum();
+    let rows = bowl.owed.iter().enumerate();
+    let moment: Vector3<f64> = rows.map(|(k, f)| cells.centre(k).cross(f)).sum();
+    assert!(force.norm() < 1e-15, "{force}");
+    assert!((moment + couple).norm() < 1e-14, "{moment} {couple}");
+    assert_eq!(bowl.owed.iter().filter(|f| **f != nothing).count(), 6);
 }
