@@ -12,7 +12,8 @@
 //! - Pressure is positive in compression, other stresses are positive in tension.
 //! - The inertial number I = γ̇ d √(ρ_s/p) is formed with the density of the grains ρ_s; the bulk
 //!   density is ρ = φ ρ_s.
-//! - Nothing depends on the number of threads: the same input gives the same bits.
+//! - A caller inside a pool of rayon's gets its threads for flows of some thousand unknowns and more, any other has one.
+//!   No bit depends on how many there are.
 //!
 //! # Cases with exact solutions
 //! [`bagnold`] (a layer on an incline), [`plane_shear`] (between plates under a load) and
@@ -59,6 +60,7 @@ pub mod plane_wave;
 pub mod rheology;
 pub mod strain;
 pub mod terrain;
+mod threads;
 pub mod units;
 pub mod vertical_chute;
 pub mod wall_friction;

@@ -16,8 +16,8 @@
 //!   stalls, the factors take over.
 //!
 //! The pattern is analysed once. Factors of earlier coefficients may go on preconditioning as long as GMRES
-//! comes to its end with them in few directions ([`SparseSystem::keep_or_factorise`]). All is done on one thread and
-//! in one order, so the bits do not depend on the number of threads.
+//! comes to its end with them in few directions ([`SparseSystem::keep_or_factorise`]). Halves of large systems are worked on
+//! side by side and every sum has one order, so the bits do not depend on the number of threads.
 
 mod dissection;
 mod gmres;
@@ -28,14 +28,17 @@ mod multigrid;
 mod panels;
 mod pattern;
 mod product;
+mod subtrees;
+mod supernodal;
 
 use std::time::Instant;
 
 use faer::sparse::SymbolicSparseColMat;
 
 use crate::error::Error;
+use crate::threads;
 pub use dissection::Place;
-use dissection::dissect;
+use dissection::{Pieces, dissect};
 use gmres::{Gmres, Goal};
 use ldlt::QuasiDefinite;
 use lu::Lu;
@@ -95,11 +98,16 @@ struct Iterative {
     gmres: Gmres,
     product: Product,
     multigrid: Option<Multigrid>,
+    analysis: Analysis,
+}
+
+/// The factors with what they are made from.
+struct Analysis {
     /// With multigrid these are made when it stalls.
     factors: Option<QuasiDefinite>,
     krylov: Krylov,
     diagonal: Vec<u32>,
-    order: Option<Vec<usize>>,
+    order: Option<(Vec<usize>, Pieces)>,
 }
 
 /// Which factors belong to the present coefficients.
@@ -111,12 +119,9 @@ enum Factors {
     Full,
 }
 
-impl Iterative {
+impl Analysis {
     /// Analyses the pattern for LDLᵀ factors, once.
-    fn analyse(
-        &mut self,
-        pattern: &SymbolicSparseColMat<usize>,
-    ) -> Result<&mut QuasiDefinite, Error> {
+    fn of(&mut self, pattern: &SymbolicSparseColMat<usize>) -> Result<&mut QuasiDefinite, Error> {
         match &mut self.factors {
             Some(factors) => Ok(factors),
             empty => Ok(empty.insert(QuasiDefinite::new(
@@ -150,7 +155,17 @@ impl SparseSystem {
         if method != Method::Direct {
             (0..size).for_each(|i| blocks.push([i], [i]));
         }
-        let (pattern, mut slots) = blocks.pattern(size);
+        let pays = size >= threads::MANY;
+        let ((pattern, mut slots), order) = threads::join(
+            pays,
+            || blocks.pattern(size),
+            || match method {
+                Method::Direct => None,
+                Method::Preconditioned(krylov) | Method::Multigrid(krylov) => {
+                    places.map(|places| dissect(places, krylov.definite))
+                }
+            },
+        );
         drop(blocks);
         let diagonal_slots = slots.split_off(given);
         let coefficients = pattern.row_idx().len();
@@ -181,18 +196,28 @@ impl SparseSystem {
                 places,
             )?),
         };
-        let mut iterative = Iterative {
-            gmres: Gmres::new(size),
-            product: Product::new(&system.pattern, krylov.definite),
-            multigrid,
+        let mut analysis = Analysis {
             factors: None,
             krylov,
             diagonal: diagonal_slots,
-            order: places.map(|places| dissect(places, krylov.definite)),
+            order,
         };
-        if iterative.multigrid.is_none() {
-            iterative.analyse(&system.pattern)?;
-        }
+        let with_factors = multigrid.is_none();
+        let (product, analysed) = threads::join(
+            pays,
+            || Product::new(&system.pattern, krylov.definite),
+            || match with_factors {
+                true => analysis.of(&system.pattern).map(|_| ()),
+                false => Ok(()),
+            },
+        );
+        analysed?;
+        let iterative = Iterative {
+            gmres: Gmres::new(size),
+            product,
+            multigrid,
+            analysis,
+        };
         system.iterative = Some(iterative);
         Ok((system, slots))
     }
@@ -241,7 +266,7 @@ impl SparseSystem {
         self.is_kept = false;
         let clock = Instant::now();
         if let Some(iterative) = &mut self.iterative
-            && let Ok(factors) = iterative.analyse(&self.pattern)
+            && let Ok(factors) = iterative.analysis.of(&self.pattern)
             && factors
                 .factorise(self.pattern.as_ref(), &self.values)
                 .is_ok()
@@ -276,10 +301,11 @@ impl SparseSystem {
         let Some(iterative) = &mut self.iterative else {
             return false;
         };
-        let product = &iterative.product;
+        let product = &mut iterative.product;
         let multiply = |x: &[f64], y: &mut [f64]| product.multiply(x, y);
         let gmres = &mut iterative.gmres;
-        match (self.state, &mut iterative.multigrid, &mut iterative.factors) {
+        let factors = &mut iterative.analysis.factors;
+        match (self.state, &mut iterative.multigrid, factors) {
             (Factors::Multigrid, Some(multigrid), _) => {
                 let precondition = |x: &mut [f64]| multigrid.solve(x);
                 gmres.solve(multiply, precondition, right_hand_side, solution, goal)
@@ -304,8 +330,8 @@ impl SparseSystem {
     ) -> Result<(), Error> {
         let mut goal = Goal::full(tolerance);
         if let Some(iterative) = &mut self.iterative {
-            goal.weighted_from = iterative.krylov.definite;
-            goal.weight = iterative.krylov.weight;
+            goal.weighted_from = iterative.analysis.krylov.definite;
+            goal.weight = iterative.analysis.krylov.weight;
             iterative.product.load(&self.values);
         }
         if self.state == Factors::Multigrid {

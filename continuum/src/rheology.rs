@@ -39,7 +39,7 @@ pub struct Threshold {
 ///
 /// The law must be isotropic, with κ non-negative and non-decreasing in γ̇: then a time step at
 /// given pressure is a convex problem with one solution.
-pub trait Rheology {
+pub trait Rheology: Sync {
     /// κ(γ̇, p) and its derivatives, for a strain rate γ̇ ≥ 0 (1/s) and a pressure p (Pa); where
     /// p ≤ 0 only cohesion is left.
     fn threshold(&self, rate: f64, pressure: f64) -> Threshold;

@@ -2,7 +2,7 @@
 //! a peer's, and how far the core creeps that does not flow.
 //!
 //! `cargo run --release -p colluvium-benchmarks --bin columns -- --tables FOLDER` on 256, 256 and 384 cells along x for
-//! a = 0.5, 1.42 and 6.26; `--aspect 0.5 --cells 128` for one of them. Prints Markdown.
+//! a = 0.5, 1.42 and 6.26; `--aspect 0.5 --cells 128` for one of them, `--threads 2` on two threads. Prints Markdown.
 //!
 //! The peer is Basilisk C 25-02-26 (own runs, serial, one core of an EPYC under load, ±30 %), which moves air of a
 //! thousandth of the density, too. A film of it under the front carries the front farther, so that its figures are no truth.
@@ -12,6 +12,7 @@
 use std::error::Error;
 use std::fs::read_to_string;
 use std::path::{Path, PathBuf};
+use std::time::Instant;
 
 use clap::Parser;
 use colluvium_benchmarks::peers::machine::{begin_peak_of_memory, memory, processor_time};
@@ -35,6 +36,9 @@ struct Arguments {
     /// Strain-rate floor ε in √(g/H).
     #[arg(long, default_value_t = 1e-5)]
     strain_rate_floor: f64,
+    /// Threads.
+    #[arg(long, default_value_t = 1)]
+    threads: usize,
     /// Folder with the profiles of the peer.
     #[arg(long)]
     tables: Option<PathBuf>,
@@ -177,6 +181,8 @@ struct Run {
     time_of_rest: Option<f64>,
     largest_core_speed: f64,
     seconds: f64,
+    /// By the clock (s).
+    wall: f64,
     spent: Spent,
     megabytes: f64,
 }
@@ -185,6 +191,7 @@ impl Run {
     fn of(case: &CollapseCase, options: &SurfaceOptions) -> Outcome<Self> {
         begin_peak_of_memory()?;
         let start = processor_time().ok_or("no processor time on this system")?;
+        let clock = Instant::now();
         let collapse = Collapse::new(case, options)?;
         let mut run = Self {
             profiles: vec![(0.0, Profile::of(&collapse), collapse.front(FRONT).position)],
@@ -197,6 +204,7 @@ impl Run {
             time_of_rest: None,
             largest_core_speed: 0.0,
             seconds: 0.0,
+            wall: 0.0,
             spent: Spent::default(),
             megabytes: 0.0,
         };
@@ -219,6 +227,7 @@ impl Run {
             }
         }
         run.seconds = processor_time().ok_or("no processor time on this system")? - start;
+        run.wall = clock.elapsed().as_secs_f64();
         run.spent = run.collapse.flow().spent();
         run.megabytes = memory("VmHWM").ok_or("no memory on this system")? * 1e-6;
         Ok(run)
@@ -256,12 +265,13 @@ fn print_cost(column: &Column, cells: usize, run: &Run) {
         .map_or("no rest".to_owned(), |t| format!("{t:.2}"));
     println!("\n## a = {}, {cells} cells along x\n", column.aspect);
     println!(
-        "| t of rest | CPU s | steps | cut | Newton iterations | active cells × steps /s | all cells × steps /s | µs/active cell and iteration | peak MB |\n|---|---|---|---|---|---|---|---|---|"
+        "| t of rest | CPU s | wall s | steps | cut | Newton iterations | active cells × steps /s | all cells × steps /s | µs/active cell and iteration | peak MB |\n|---|---|---|---|---|---|---|---|---|---|"
     );
     let active = run.cell_steps as f64;
     println!(
-        "| {rest} | {:.1} | {} | {} | {} | {:.2e} | {:.2e} | {:.1} | {:.0} |",
+        "| {rest} | {:.1} | {:.2} | {} | {} | {} | {:.2e} | {:.2e} | {:.1} | {:.0} |",
         run.seconds,
+        run.wall,
         run.steps,
         run.cut,
         run.iterations,
@@ -284,6 +294,10 @@ fn print_cost(column: &Column, cells: usize, run: &Run) {
         evaluation,
     ];
     println!("| {} |", phases.map(|part| share(part, whole)).join(" | "));
+    println!(
+        "| {} |",
+        phases.map(|part| format!("{part:.2} s")).join(" | ")
+    );
 }
 
 fn print_fronts(
@@ -409,6 +423,14 @@ fn print_creep(case: &CollapseCase, floor: f64, mut run: Run) -> Outcome<()> {
 
 fn main() -> Outcome<()> {
     let arguments = Arguments::parse();
+    let pool = rayon::ThreadPoolBuilder::new()
+        .num_threads(arguments.threads)
+        .build()?;
+    pool.install(|| columns(&arguments).map_err(|error| error.to_string()))?;
+    Ok(())
+}
+
+fn columns(arguments: &Arguments) -> Outcome<()> {
     let mut options = SurfaceOptions {
         courant: arguments.courant,
         ..SurfaceOptions::default()

@@ -3,13 +3,13 @@
 //!
 //! `cargo run --release -p colluvium-benchmarks --bin linear-solvers -- space 0.1 1e-3 16 24 32 40` collapses a quarter
 //! of a cylinder until t = 0.1 √(H/g) on these numbers of cells, with linear systems solved to 1e-3; `plane` a column.
-//! Each case runs in a process of its own, both solvers by turns, because memory belongs to a process and
+//! `--threads 2` before these takes two threads. Each case runs in a process of its own, both solvers by turns, because memory belongs to a process and
 //! a machine's speed changes with time.
 
-use std::io::Error as IoError;
 use std::process::Command;
+use std::time::Instant;
 
-use colluvium_benchmarks::peers::machine::memory;
+use colluvium_benchmarks::peers::machine::{memory, processor_time};
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
 use colluvium_continuum::cylinder_collapse::{CylinderCase, CylinderCollapse};
 use colluvium_continuum::free_surface::{Contact, SurfaceOptions, SurfaceStep};
@@ -18,33 +18,36 @@ use colluvium_continuum::yield_step::LinearSolver;
 
 type Outcome = Result<(), Box<dyn std::error::Error>>;
 
-const USAGE: &str = "arguments: space|plane END TOLERANCE CELLS...";
+const USAGE: &str = "arguments: [--threads N] space|plane END TOLERANCE CELLS...";
 
 fn main() -> Outcome {
-    let arguments: Vec<String> = std::env::args().skip(1).collect();
+    let mut arguments: Vec<String> = std::env::args().skip(1).collect();
+    let mut threads = "1".to_owned();
+    if arguments.first().is_some_and(|first| first == "--threads") && arguments.len() > 1 {
+        threads = arguments.drain(..2).nth(1).unwrap_or_default();
+    }
     match arguments.as_slice() {
         [flow, end, tolerance, cells, solver] if solver.parse::<usize>().is_err() => {
             let solver = match solver.as_str() {
                 "factors" => LinearSolver::Factors,
                 _ => LinearSolver::Multigrid,
             };
-            run(
-                flow,
-                end.parse()?,
-                tolerance.parse()?,
-                cells.parse()?,
-                solver,
-            )
+            let (end, tolerance, cells) = (end.parse()?, tolerance.parse()?, cells.parse()?);
+            let pool = rayon::ThreadPoolBuilder::new()
+                .num_threads(threads.parse()?)
+                .build()?;
+            let run = || run(flow, end, tolerance, cells, solver).map_err(|e| e.to_string());
+            Ok(pool.install(run)?)
         }
         [flow, end, tolerance, cells @ ..] if !cells.is_empty() => {
             println!(
-                "solver    cells  active  steps  iterations  CPU (s)  us/cell/iteration  MB  run-out  asymmetry"
+                "solver    cells  active  steps  iterations  CPU (s)  wall (s)  us/cell/iteration  MB  run-out  asymmetry  factors, Krylov, all (s)"
             );
             let program = std::env::current_exe()?;
             for cells in cells {
                 for solver in ["factors", "multigrid"] {
                     let status = Command::new(&program)
-                        .args([flow, end, tolerance, cells, solver])
+                        .args(["--threads", &threads, flow, end, tolerance, cells, solver])
                         .status()?;
                     if !status.success() {
                         println!("{solver} {cells}: {status}");
@@ -79,9 +82,11 @@ fn run(flow: &str, end: f64, tolerance: f64, cells: usize, solver: LinearSolver)
     let mut options = SurfaceOptions::default();
     options.solver.linear_tolerance = tolerance;
     options.solver.linear_solver = solver;
-    let begin = cpu_seconds()?;
+    let no_time = "no processor time on this system";
+    let begin = processor_time().ok_or(no_time)?;
+    let clock = Instant::now();
     let mut work = Work::default();
-    let (run_out, asymmetry) = match flow {
+    let (run_out, asymmetry, spent) = match flow {
         "space" => {
             let case = CylinderCase {
                 aspect: 1.0,
@@ -101,7 +106,8 @@ fn run(flow: &str, end: f64, tolerance: f64, cells: usize, solver: LinearSolver)
                     break;
                 }
             }
-            (collapse.front(0.02).radius - 1.0, collapse.asymmetry())
+            let front = collapse.front(0.02).radius;
+            (front - 1.0, collapse.asymmetry(), collapse.flow().spent())
         }
         "plane" => {
             let case = CollapseCase {
@@ -121,31 +127,24 @@ fn run(flow: &str, end: f64, tolerance: f64, cells: usize, solver: LinearSolver)
                     break;
                 }
             }
-            (collapse.front(0.02).position * 1.42 - 1.0, 0.0)
+            let front = collapse.front(0.02).position;
+            (front * 1.42 - 1.0, 0.0, collapse.flow().spent())
         }
         _ => return Err(USAGE.into()),
     };
-    let cpu = cpu_seconds()? - begin;
+    let cpu = processor_time().ok_or(no_time)? - begin;
+    let wall = clock.elapsed().as_secs_f64();
     println!(
-        "{:9} {cells:5} {:7} {:6} {:11} {cpu:8.2} {:18.1} {:4.0} {run_out:.12} {asymmetry:.1e}",
+        "{:9} {cells:5} {:7} {:6} {:11} {cpu:8.2} {wall:8.2} {:18.1} {:4.0} {run_out:.12} {asymmetry:.1e} {:.2} {:.2} {:.2}",
         format!("{solver:?}").to_lowercase(),
         work.active,
         work.steps,
         work.iterations,
         cpu * 1e6 / work.cell_iterations as f64,
         memory("VmHWM").ok_or("no memory on this system")? * 1e-6,
+        spent.within_newton.factors,
+        spent.within_newton.krylov,
+        spent.transport + spent.operators + spent.analysis + spent.newton,
     );
     Ok(())
-}
-
-/// Time for which this thread had a processor (s).
-fn cpu_seconds() -> Result<f64, IoError> {
-    let text = std::fs::read_to_string("/proc/thread-self/schedstat")?;
-    let first = text
-        .split_whitespace()
-        .next()
-        .and_then(|n| n.parse::<f64>().ok());
-    first
-        .map(|n| n * 1e-9)
-        .ok_or_else(|| IoError::other("no time in /proc/thread-self/schedstat"))
 }

@@ -17,18 +17,31 @@ pub type Place<const D: usize = DIMENSIONS> = [u32; D];
 /// Pieces of fewer unknowns are not cut.
 const SMALLEST_PIECE: usize = 12;
 
+/// Pieces of fewer velocities stay whole: halves of them are not worth another thread.
+const SMALLEST_HALVED: usize = 2000;
+
+/// An order of elimination as it came about: where a piece ends in it, and the two halves that come before its strip.
+#[derive(Debug)]
+pub(super) struct Pieces {
+    pub end: usize,
+    pub halves: Option<Box<[Pieces; 2]>>,
+}
+
 /// The unknowns in the order in which they are eliminated; those from number `definite` on are
-/// pressures.
-pub(super) fn dissect<const D: usize>(places: &[Place<D>], definite: usize) -> Vec<usize> {
-    let pressures = places.len() - definite;
-    let mut order: Vec<usize> = (definite..places.len()).chain(0..definite).collect();
+/// pressures. Large pieces have their pressures with them, so that halves stand apart in the order.
+pub(super) fn dissect<const D: usize>(
+    places: &[Place<D>],
+    definite: usize,
+) -> (Vec<usize>, Pieces) {
     let mut work = Dissection {
         places,
         sorted: vec![0; definite],
         counts: Vec::new(),
     };
-    work.cut(&mut order[pressures..]);
-    order
+    let mut order = Vec::with_capacity(places.len());
+    let pressures = (definite..places.len()).collect();
+    let pieces = work.halve(pressures, (0..definite).collect(), &mut order);
+    (order, pieces)
 }
 
 struct Dissection<'a, const D: usize> {
@@ -45,25 +58,73 @@ struct Cut {
     strip: usize,
 }
 
+impl Cut {
+    /// 0 below the strip, 1 above it, 2 in it.
+    fn part_of<const D: usize>(&self, place: &Place<D>) -> usize {
+        let place = place[self.axis];
+        if place + 1 < self.column {
+            0
+        } else if place > self.column + 1 {
+            1
+        } else {
+            2
+        }
+    }
+}
+
 impl<const D: usize> Dissection<'_, D> {
+    /// Puts pressures and velocities into order behind what is there, halves of large pieces each by themselves.
+    fn halve(
+        &mut self,
+        pressures: Vec<usize>,
+        velocities: Vec<usize>,
+        order: &mut Vec<usize>,
+    ) -> Pieces {
+        let is_large = velocities.len() >= SMALLEST_HALVED;
+        let Some(cut) = is_large.then(|| self.best_cut(&velocities)).flatten() else {
+            order.extend(pressures);
+            let first = order.len();
+            order.extend(velocities);
+            self.cut(&mut order[first..]);
+            return Pieces {
+                end: order.len(),
+                halves: None,
+            };
+        };
+        let places = self.places;
+        let divide = |unknowns: Vec<usize>| {
+            let mut parts = [const { Vec::new() }; 3];
+            for unknown in unknowns {
+                parts[cut.part_of(&places[unknown])].push(unknown);
+            }
+            parts
+        };
+        let [low_pressures, high_pressures, pressures] = divide(pressures);
+        let [low, high, strip] = divide(velocities);
+        let low = self.halve(low_pressures, low, order);
+        let high = self.halve(high_pressures, high, order);
+        order.extend(pressures);
+        order.extend(strip);
+        Pieces {
+            end: order.len(),
+            halves: Some(Box::new([low, high])),
+        }
+    }
+
+    fn best_cut(&mut self, piece: &[usize]) -> Option<Cut> {
+        let cuts: [Option<Cut>; D] = std::array::from_fn(|axis| self.middle(piece, axis));
+        cuts.into_iter().flatten().min_by_key(|cut| cut.strip)
+    }
+
     fn cut(&mut self, piece: &mut [usize]) {
         if piece.len() < SMALLEST_PIECE {
             return;
         }
-        let cuts: [Option<Cut>; D] = std::array::from_fn(|axis| self.middle(piece, axis));
-        let best = cuts.into_iter().flatten().min_by_key(|cut| cut.strip);
-        let Some(cut) = best else { return };
-        let places = self.places;
-        let part_of = |unknown: usize| {
-            let place = places[unknown][cut.axis];
-            if place + 1 < cut.column {
-                0
-            } else if place > cut.column + 1 {
-                1
-            } else {
-                2
-            }
+        let Some(cut) = self.best_cut(piece) else {
+            return;
         };
+        let places = self.places;
+        let part_of = |unknown: usize| cut.part_of(&places[unknown]);
         let mut counts = [0; 3];
         for &unknown in piece.iter() {
             counts[part_of(unknown)] += 1;
@@ -128,7 +189,7 @@ mod tests {
     #[test]
     fn order_holds_every_unknown_once() {
         let (places, definite) = places(13, 7);
-        let mut order = dissect(&places, definite);
+        let (mut order, _) = dissect(&places, definite);
         assert_ne!(order, (0..places.len()).collect::<Vec<_>>());
         order.sort_unstable();
         assert_eq!(order, (0..places.len()).collect::<Vec<_>>());
@@ -138,7 +199,7 @@ mod tests {
     #[test]
     fn first_cut_goes_across_the_longer_axis() {
         let (places, definite) = places(21, 5);
-        let order = dissect(&places, definite);
+        let (order, _) = dissect(&places, definite);
         let pressures = places.len() - definite;
         assert!(order[..pressures].iter().all(|&j| j >= definite));
         let strip = &order[order.len() - (2 * 5 + 5 + 1)..];

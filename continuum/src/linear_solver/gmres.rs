@@ -107,7 +107,7 @@ impl Gmres {
     /// Solves A x = b; returns whether the tolerance was met.
     pub(super) fn solve(
         &mut self,
-        multiply: impl Fn(&[f64], &mut [f64]),
+        mut multiply: impl FnMut(&[f64], &mut [f64]),
         mut precondition: impl FnMut(&mut [f64]),
         b: &[f64],
         x: &mut [f64],
@@ -143,7 +143,7 @@ impl Gmres {
             self.reduced[0] = size;
             let mut used = 0;
             while used < left.min(DIRECTIONS) && self.reduced[used].abs() > 0.5 * target {
-                self.extend(used, &multiply, &mut precondition, goal);
+                self.extend(used, &mut multiply, &mut precondition, goal);
                 used += 1;
             }
             if used == 0 {
@@ -159,7 +159,7 @@ impl Gmres {
     fn extend(
         &mut self,
         k: usize,
-        multiply: &impl Fn(&[f64], &mut [f64]),
+        multiply: &mut impl FnMut(&[f64], &mut [f64]),
         precondition: &mut impl FnMut(&mut [f64]),
         goal: Goal,
     ) {

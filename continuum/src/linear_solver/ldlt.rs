@@ -18,32 +18,48 @@ use faer::sparse::linalg::cholesky::{
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par, Side};
 
+use super::dissection::Pieces;
 use super::panels::Panels;
+use super::subtrees::Subtree;
+use super::supernodal::{Bench, Factorisation, Layout, SMALLEST_PIVOT};
 use crate::error::Error;
+use crate::threads;
 
 /// LDLᵀ factors of the lower triangle of a matrix of fixed pattern, with −δ on the diagonal of the
 /// second block.
 pub(super) struct QuasiDefinite {
-    symbolic: SymbolicCholesky<usize>,
+    kind: Kind,
     factors: Vec<f64>,
-    /// The factors in single precision, where they are used so.
-    panels: Option<Panels>,
     values: Vec<f64>,
     diagonal: Vec<u32>,
-    signs: Vec<i8>,
     definite: usize,
     regularisation: f64,
+}
+
+enum Kind {
+    Tight(Box<Tight>),
+    Loose(Box<Loose>),
+}
+
+/// Factors that are used in double precision.
+struct Tight {
+    symbolic: SymbolicCholesky<usize>,
+    signs: Vec<i8>,
     scratch: MemBuffer,
-    /// A right-hand side in the order of the factors.
-    ordered: Vec<f64>,
+}
+
+/// Factors that are used in single precision.
+struct Loose {
+    symbolic: SymbolicCholesky<usize>,
+    layout: Layout,
+    tree: Subtree,
+    bench: Bench,
+    panels: Panels,
 }
 
 /// Supernodes are merged up to so many columns while zeros are less than this part of them. Substitution reads zeros,
 /// too: with faer's own choice factors of plane flows are a tenth larger.
 const MERGED: [(usize, f64); 3] = [(4, 0.5), (16, 0.2), (48, 0.05)];
-
-/// Pivots smaller than this, or of the wrong sign by round-off, are replaced by it.
-const SMALLEST_PIVOT: f64 = 1e-14;
 
 impl QuasiDefinite {
     pub(super) fn new(
@@ -51,9 +67,10 @@ impl QuasiDefinite {
         definite: usize,
         regularisation: f64,
         diagonal: Vec<u32>,
-        order: Option<Vec<usize>>,
+        order: Option<(Vec<usize>, Pieces)>,
         loose: bool,
     ) -> Result<Self, Error> {
+        let (order, pieces) = order.unzip();
         let order = order.map(|forward| {
             let mut back = vec![0; forward.len()];
             for (place, &unknown) in forward.iter().enumerate() {
@@ -75,28 +92,47 @@ impl QuasiDefinite {
         }
         let symbolic = factorize_symbolic_cholesky(pattern, Side::Lower, ordering, parameters)
             .map_err(|e| Error::LinearSolver(format!("{e:?}")))?;
-        let need = symbolic
-            .factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default())
-            .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
-        let scratch = MemBuffer::try_new(need)
-            .map_err(|_| Error::LinearSolver("out of memory".to_owned()))?;
-        let panels = match symbolic.raw() {
-            SymbolicCholeskyRaw::Supernodal(supernodes) if loose => Some(Panels::new(supernodes)),
-            _ => None,
+        let factors = vec![0.0; symbolic.len_val()];
+        let sign = |unknown: usize| if unknown < definite { 1 } else { -1 };
+        let kind = match (symbolic.raw(), symbolic.perm()) {
+            (SymbolicCholeskyRaw::Supernodal(supernodes), Some(order)) if loose => {
+                let tree = Subtree::new(supernodes, pieces.as_ref());
+                let (panels, (layout, bench)) = threads::join(
+                    diagonal.len() >= threads::MANY,
+                    || Panels::new(supernodes, &tree, order.arrays().0),
+                    || {
+                        let layout = Layout::new(pattern, order, supernodes, sign);
+                        let bench = Bench::new(supernodes, &layout, &tree);
+                        (layout, bench)
+                    },
+                );
+                Kind::Loose(Box::new(Loose {
+                    bench,
+                    layout,
+                    tree,
+                    panels,
+                    symbolic,
+                }))
+            }
+            _ => {
+                let need = symbolic
+                    .factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default())
+                    .or(symbolic.solve_in_place_scratch::<f64>(1, Par::Seq));
+                Kind::Tight(Box::new(Tight {
+                    signs: (0..diagonal.len()).map(sign).collect(),
+                    scratch: MemBuffer::try_new(need)
+                        .map_err(|_| Error::LinearSolver("out of memory".to_owned()))?,
+                    symbolic,
+                }))
+            }
         };
         Ok(Self {
-            factors: vec![0.0; symbolic.len_val()],
-            panels,
-            symbolic,
+            kind,
+            factors,
             values: vec![0.0; pattern.row_idx().len()],
-            signs: (0..diagonal.len())
-                .map(|i| if i < definite { 1 } else { -1 })
-                .collect(),
             diagonal,
             definite,
             regularisation,
-            scratch,
-            ordered: vec![0.0; pattern.nrows()],
         })
     }
 
@@ -109,59 +145,108 @@ impl QuasiDefinite {
         for &slot in &self.diagonal[self.definite..] {
             self.values[slot as usize] -= self.regularisation;
         }
-        self.symbolic
-            .factorize_numeric_ldlt(
-                &mut self.factors,
-                SparseColMatRef::new(pattern, &self.values),
-                Side::Lower,
-                LdltRegularization {
-                    dynamic_regularization_signs: Some(&self.signs),
-                    dynamic_regularization_delta: SMALLEST_PIVOT,
-                    dynamic_regularization_epsilon: SMALLEST_PIVOT,
-                },
-                Par::Seq,
-                MemStack::new(&mut self.scratch),
-                Default::default(),
-            )
-            .map_err(|e| Error::LinearSolver(format!("{e:?}")))?;
-        if let (SymbolicCholeskyRaw::Supernodal(supernodes), Some(panels)) =
-            (self.symbolic.raw(), &mut self.panels)
-        {
-            panels.load(supernodes, &self.factors);
+        match &mut self.kind {
+            Kind::Tight(tight) => tight
+                .symbolic
+                .factorize_numeric_ldlt(
+                    &mut self.factors,
+                    SparseColMatRef::new(pattern, &self.values),
+                    Side::Lower,
+                    LdltRegularization {
+                        dynamic_regularization_signs: Some(&tight.signs),
+                        dynamic_regularization_delta: SMALLEST_PIVOT,
+                        dynamic_regularization_epsilon: SMALLEST_PIVOT,
+                    },
+                    Par::Seq,
+                    MemStack::new(&mut tight.scratch),
+                    Default::default(),
+                )
+                .map(|_| ())
+                .map_err(|e| Error::LinearSolver(format!("{e:?}"))),
+            Kind::Loose(loose) => {
+                let Loose {
+                    symbolic,
+                    layout,
+                    tree,
+                    bench,
+                    panels,
+                } = &mut **loose;
+                let SymbolicCholeskyRaw::Supernodal(symbolic) = symbolic.raw() else {
+                    return Err(Error::LinearSolver("no supernodes".to_owned()));
+                };
+                let work = Factorisation {
+                    symbolic,
+                    layout,
+                    values: &self.values,
+                };
+                work.factorise(tree, &mut self.factors, bench, panels)
+            }
         }
-        Ok(())
     }
 
     /// Overwrites x with S⁻¹ x; there must be factors.
     pub(super) fn solve(&mut self, x: &mut [f64]) {
-        if let (Some(order), Some(panels)) = (self.symbolic.perm(), &mut self.panels) {
-            let (forward, _) = order.arrays();
-            for (y, &from) in self.ordered.iter_mut().zip(forward) {
-                *y = x[from];
+        match &mut self.kind {
+            Kind::Tight(tight) => {
+                let rows = x.len();
+                LdltRef::new(&tight.symbolic, &self.factors).solve_in_place_with_conj(
+                    Conj::No,
+                    MatMut::from_column_major_slice_mut(x, rows, 1),
+                    Par::Seq,
+                    MemStack::new(&mut tight.scratch),
+                );
             }
-            panels.substitute(&mut self.ordered);
-            for (y, &to) in self.ordered.iter().zip(forward) {
-                x[to] = *y;
-            }
-            return;
+            Kind::Loose(loose) => loose.panels.substitute(x),
         }
-        let rows = x.len();
-        LdltRef::new(&self.symbolic, &self.factors).solve_in_place_with_conj(
-            Conj::No,
-            MatMut::from_column_major_slice_mut(x, rows, 1),
-            Par::Seq,
-            MemStack::new(&mut self.scratch),
-        );
     }
 }
 
 #[cfg(test)]
 mod tests {
-    use super::*;
-    use crate::linear_solver::Blocks;
+    use faer::sparse::SymbolicSparseColMat;
 
-    /// The membrane of a square grid with a pressure for each second unknown: supernodes of many widths.
-    fn membrane(side: usize) -> (QuasiDefinite, Vec<f64>, Vec<Vec<f64>>) {
+    use super::*;
+    use crate::linear_solver::dissection::dissect;
+    use crate::linear_solver::{Blocks, Place};
+
+    /// A matrix by its coefficients, −δ included.
+    struct Membrane {
+        factors: QuasiDefinite,
+        pattern: SymbolicSparseColMat<usize>,
+        values: Vec<f64>,
+        delta: f64,
+    }
+
+    impl Membrane {
+        fn size(&self) -> usize {
+            self.pattern.ncols()
+        }
+
+        fn product(&self, x: &[f64]) -> Vec<f64> {
+            let mut y: Vec<f64> = vec![0.0; x.len()];
+            for (column, bounds) in self.pattern.col_ptr().windows(2).enumerate() {
+                for slot in bounds[0]..bounds[1] {
+                    y[self.pattern.row_idx()[slot]] += self.values[slot] * x[column];
+                }
+            }
+            let pressures = self.factors.definite..x.len();
+            pressures.for_each(|i| y[i] -= self.delta * x[i]);
+            y
+        }
+
+        /// Largest error of a solution, of which the right-hand side is made.
+        fn miss(&mut self) -> f64 {
+            let expected: Vec<f64> = (0..self.size()).map(|n| (1.7 * n as f64).sin()).collect();
+            let mut x = self.product(&expected);
+            self.factors.solve(&mut x);
+            let miss = x.iter().zip(&expected).map(|(x, e)| (x - e).abs());
+            miss.fold(0.0_f64, f64::max)
+        }
+    }
+
+    /// The membrane of a square grid with a pressure for each second unknown: supernodes of many widths. Where places are
+    /// known it is dissected; a bridge goes from one corner to the other, of which places know nothing.
+    fn membrane(side: usize, with_places: bool, with_bridge: bool) -> Membrane {
         let definite = side * side;
         let size = definite + definite / 2;
         let mut blocks = Blocks::default();
@@ -178,6 +263,9 @@ mod tests {
                 add([j, j + side], [0.9, -0.7, -0.7, 1.0]);
             }
         }
+        if with_bridge {
+            add([0, definite - 1], [0.3, -0.2, -0.2, 0.3]);
+        }
         for cell in 0..definite / 2 {
             add([2 * cell, definite + cell], [0.1, 0.5, 0.5, 0.0]);
         }
@@ -188,45 +276,107 @@ mod tests {
         for (&slot, c) in slots.iter().zip(&coefficients) {
             values[slot as usize] += c;
         }
-        let mut dense = vec![vec![0.0; size]; size];
-        for (column, bounds) in pattern.col_ptr().windows(2).enumerate() {
-            for slot in bounds[0]..bounds[1] {
-                dense[pattern.row_idx()[slot]][column] = values[slot];
-            }
-        }
         let delta = 0.5;
-        (definite..size).for_each(|i| dense[i][i] -= delta);
         let diagonal = diagonal.to_vec();
+        let place = |node: usize| [2 * (node % side) as u32, 2 * (node / side) as u32];
+        let places: Vec<Place> = (0..definite)
+            .chain((0..definite / 2).map(|cell| 2 * cell))
+            .map(place)
+            .collect();
+        let order = with_places.then(|| dissect(&places, definite));
         let mut factors =
-            QuasiDefinite::new(pattern.as_ref(), definite, delta, diagonal, None, true).unwrap();
+            QuasiDefinite::new(pattern.as_ref(), definite, delta, diagonal, order, true).unwrap();
         factors.factorise(pattern.as_ref(), &values).unwrap();
-        let x = (0..size).map(|n| (1.7 * n as f64).sin()).collect();
-        (factors, x, dense)
+        Membrane {
+            factors,
+            pattern,
+            values,
+            delta,
+        }
     }
 
     /// Factors in single precision solve the system to single precision, whatever the widths of supernodes.
     #[test]
     fn panels_solve_the_system_to_single_precision() {
         for side in [2, 7, 19] {
-            let (mut factors, expected, dense) = membrane(side);
-            assert!(factors.panels.is_some());
-            let product = |row: &Vec<f64>| row.iter().zip(&expected).map(|(a, x)| a * x).sum();
-            let mut x: Vec<f64> = dense.iter().map(product).collect();
-            factors.solve(&mut x);
-            let miss = x.iter().zip(&expected).map(|(x, e)| (x - e).abs());
-            let miss = miss.fold(0.0_f64, f64::max);
+            let mut membrane = membrane(side, false, false);
+            assert!(matches!(membrane.factors.kind, Kind::Loose(_)));
+            let miss = membrane.miss();
             assert!(miss < 1e-4, "{side}: {miss}");
         }
+    }
+
+    /// Halves of a large membrane are factorised each by itself, and a system with wide supernodes is solved. What
+    /// couples the halves past the strip between them makes one of them, and the solution stays.
+    #[test]
+    fn halves_stand_apart_unless_they_are_coupled() {
+        for (with_bridge, are_apart) in [(false, true), (true, false)] {
+            let mut membrane = membrane(120, true, with_bridge);
+            let Kind::Loose(loose) = &membrane.factors.kind else {
+                panic!("not in panels");
+            };
+            assert_eq!(loose.tree.halves.is_some(), are_apart);
+            let miss = membrane.miss();
+            assert!(miss < 1e-4, "{with_bridge}: {miss}");
+        }
+    }
+
+    /// The factors are those that faer makes of the same supernodes.
+    #[test]
+    fn factors_are_those_of_another_code() {
+        let membrane = membrane(120, true, false);
+        let factors = &membrane.factors;
+        let Kind::Loose(loose) = &factors.kind else {
+            panic!("not in panels");
+        };
+        let symbolic = &loose.symbolic;
+        let need = symbolic.factorize_numeric_ldlt_scratch::<f64>(Par::Seq, Default::default());
+        let mut expected = vec![0.0; factors.factors.len()];
+        symbolic
+            .factorize_numeric_ldlt(
+                &mut expected,
+                SparseColMatRef::new(membrane.pattern.as_ref(), &factors.values),
+                Side::Lower,
+                LdltRegularization::default(),
+                Par::Seq,
+                MemStack::new(&mut MemBuffer::new(need)),
+                Default::default(),
+            )
+            .unwrap();
+        let SymbolicCholeskyRaw::Supernodal(supernodes) = symbolic.raw() else {
+            panic!("no supernodes");
+        };
+        let mut widest = 0;
+        for s in 0..supernodes.n_supernodes() {
+            let width = supernodes.supernode_end()[s] - supernodes.supernode_begin()[s];
+            let height = width + supernodes.supernode(s).pattern().len();
+            let place = supernodes.col_ptr_for_val()[s];
+            widest = widest.max(width);
+            for column in 0..width {
+                for row in column..height {
+                    let at = place + column * height + row;
+                    let (found, expected) = (factors.factors[at], expected[at]);
+                    let miss = (found - expected).abs();
+                    assert!(miss < 1e-12 * expected.abs().max(1.0), "{found} {expected}");
+                }
+            }
+        }
+        assert!(widest > 100, "{widest}: no supernode of several blocks");
     }
 
     /// What the processor is told to do gives the bits of plain loops.
     #[test]
     fn every_processor_gives_the_same_bits() {
-        let (mut factors, start, _) = membrane(19);
-        let panels = factors.panels.as_mut().unwrap();
+        let mut membrane = membrane(19, false, false);
+        let start: Vec<f64> = (0..membrane.size())
+            .map(|n| (1.7 * n as f64).sin())
+            .collect();
+        let Kind::Loose(loose) = &mut membrane.factors.kind else {
+            panic!("not in panels");
+        };
         let (mut fast, mut plain) = (start.clone(), start);
-        panels.substitute(&mut fast);
-        panels.substitute_by::<crate::linear_solver::lanes::Plain>(&mut plain);
+        loose.panels.substitute(&mut fast);
+        loose.panels.substitute_plainly(&mut plain);
         assert!(
             fast.iter()
                 .zip(&plain)

@@ -10,6 +10,8 @@ use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 #[cfg(target_arch = "x86_64")]
 use super::lanes::Wide;
 use super::lanes::{LANES, Lanes, Plain};
+use super::subtrees::Subtree;
+use crate::threads;
 
 /// Most columns of a panel.
 const WIDTH: usize = 4;
@@ -24,12 +26,22 @@ struct Supernode {
     rows: u32,
 }
 
-/// The factors as substitution reads them.
+/// The factors of a subtree as substitution reads them. Its unknowns stand in a memory of its own, followed by those that it
+/// changes outside, which begin at zero and are added to the ones of the tree above once it is done.
 #[derive(Debug)]
 pub(super) struct Panels {
+    halves: Option<Box<[Panels; 2]>>,
+    /// The first supernode of its own.
+    own: usize,
     supernodes: Vec<Supernode>,
     rows: Vec<u32>,
     values: Vec<f32>,
+    /// Where its own unknowns stand among all,
+    unknowns: Vec<u32>,
+    /// and where those outside stand in the memory of the tree above.
+    outside: Vec<u32>,
+    /// Its own unknowns, then those outside.
+    memory: Vec<f64>,
     /// Unknowns of the present supernode and those below it.
     local: Vec<f64>,
 }
@@ -40,22 +52,42 @@ const fn size_of_panel(width: usize, below: usize) -> usize {
 }
 
 impl Panels {
-    /// Room for the factors of a pattern.
-    pub(super) fn new(symbolic: &SymbolicSupernodalCholesky<usize>) -> Self {
+    /// Room for the factors of a pattern, in the order `forward` of elimination.
+    pub(super) fn new(
+        symbolic: &SymbolicSupernodalCholesky<usize>,
+        tree: &Subtree,
+        forward: &[usize],
+    ) -> Self {
+        let mut places = vec![0; symbolic.nrows()];
+        Self::of(symbolic, tree, forward, &mut places).0
+    }
+
+    /// The panels of a subtree, and the rows outside that it changes.
+    fn of(
+        symbolic: &SymbolicSupernodalCholesky<usize>,
+        tree: &Subtree,
+        forward: &[usize],
+        places: &mut [u32],
+    ) -> (Self, Vec<u32>) {
         let (begins, ends) = (symbolic.supernode_begin(), symbolic.supernode_end());
-        let mut supernodes = Vec::with_capacity(begins.len());
-        let mut all_rows = Vec::new();
+        let mut halves = tree
+            .halves
+            .as_ref()
+            .map(|halves| [0, 1].map(|n| Self::of(symbolic, &halves[n], forward, places)));
+        let own = begins[tree.own]..ends[tree.supernodes.end - 1];
+        let mut supernodes = Vec::with_capacity(tree.own().len());
+        let mut rows = Vec::new();
         let (mut numbers, mut longest) = (0, 0);
-        for (s, (&begin, &end)) in begins.iter().zip(ends).enumerate() {
+        for s in tree.own() {
             let pattern = symbolic.supernode(s).pattern();
-            let columns = end - begin;
+            let columns = ends[s] - begins[s];
             supernodes.push(Supernode {
-                first: begin as u32,
+                first: (begins[s] - own.start) as u32,
                 columns: columns as u32,
-                rows_from: all_rows.len() as u32,
+                rows_from: rows.len() as u32,
                 rows: pattern.len() as u32,
             });
-            all_rows.extend(pattern.iter().map(|&row| row as u32));
+            rows.extend(pattern.iter().map(|&row| row as u32));
             longest = longest.max(columns + pattern.len());
             numbers += if columns == 1 {
                 1 + pattern.len()
@@ -67,22 +99,60 @@ impl Panels {
                     .sum()
             };
         }
-        Self {
-            supernodes,
-            rows: all_rows,
-            values: vec![0.0; numbers],
-            local: vec![0.0; longest + LANES],
+        let is_outside = |row: &u32| *row as usize >= own.end;
+        let mut outside: Vec<u32> = rows.iter().copied().filter(is_outside).collect();
+        for (_, below) in halves.iter().flatten() {
+            outside.extend(below.iter().filter(|row| is_outside(row)));
         }
+        outside.sort_unstable();
+        outside.dedup();
+        for (place, row) in own
+            .clone()
+            .chain(outside.iter().map(|&r| r as usize))
+            .enumerate()
+        {
+            places[row] = place as u32;
+        }
+        let to_places = |rows: &mut [u32]| {
+            rows.iter_mut().for_each(|row| *row = places[*row as usize]);
+        };
+        to_places(&mut rows);
+        for (half, below) in halves.iter_mut().flatten() {
+            to_places(below);
+            half.outside = std::mem::take(below);
+        }
+        let panels = Self {
+            halves: halves.map(|halves| Box::new(halves.map(|(half, _)| half))),
+            own: tree.own,
+            supernodes,
+            rows,
+            values: vec![0.0; numbers],
+            unknowns: forward[own.clone()].iter().map(|&n| n as u32).collect(),
+            memory: vec![0.0; own.len() + outside.len()],
+            outside: Vec::new(),
+            local: vec![0.0; longest + LANES],
+        };
+        (panels, outside)
     }
 
-    /// Takes the factors over from columns; D stands on the diagonal of L.
-    pub(super) fn load(&mut self, symbolic: &SymbolicSupernodalCholesky<usize>, factors: &[f64]) {
-        let places = symbolic.col_ptr_for_val();
+    /// The halves that the subtree has, to be filled side by side.
+    pub(super) fn halves_mut(&mut self) -> Option<&mut [Panels; 2]> {
+        self.halves.as_deref_mut()
+    }
+
+    /// Takes the factors of its own supernodes over from columns, which begin at `first` of all; D stands on the diagonal of L.
+    pub(super) fn load(
+        &mut self,
+        symbolic: &SymbolicSupernodalCholesky<usize>,
+        factors: &[f64],
+        first: usize,
+    ) {
+        let places = &symbolic.col_ptr_for_val()[self.own..];
         let mut values = self.values.as_mut_slice();
         for (node, &place) in self.supernodes.iter().zip(places) {
             let columns = node.columns as usize;
             let height = columns + node.rows as usize;
-            let block = &factors[place..place + columns * height];
+            let block = &factors[place - first..][..columns * height];
             if columns == 1 {
                 let (here, later) = values.split_at_mut(height);
                 values = later;
@@ -115,22 +185,82 @@ impl Panels {
         }
     }
 
-    /// Overwrites x with (L D Lᵀ)⁻¹ x, in the order of the factors. The bits are the same on every processor.
+    /// Overwrites x with (L D Lᵀ)⁻¹ x. The bits are the same on every processor and any number of threads.
     pub(super) fn substitute(&mut self, x: &mut [f64]) {
+        self.go_up(x);
+        self.go_down(&[]);
+        self.hand_out(x);
+    }
+
+    /// Substitutes forwards: from the leaves to the root.
+    fn go_up(&mut self, x: &[f64]) {
+        if let Some([low, high]) = self.halves.as_deref_mut() {
+            threads::join(true, || low.go_up(x), || high.go_up(x));
+        }
+        let (own, outside) = self.memory.split_at_mut(self.unknowns.len());
+        for (y, &from) in own.iter_mut().zip(&self.unknowns) {
+            *y = x[from as usize];
+        }
+        outside.fill(0.0);
+        for half in self.halves.as_deref().into_iter().flatten() {
+            let changes = &half.memory[half.unknowns.len()..];
+            for (change, &to) in changes.iter().zip(&half.outside) {
+                self.memory[to as usize] += change;
+            }
+        }
+        self.on_processor(true);
+    }
+
+    /// Substitutes backwards: from the root to the leaves.
+    fn go_down(&mut self, above: &[f64]) {
+        let outside = &mut self.memory[self.unknowns.len()..];
+        for (y, &from) in outside.iter_mut().zip(&self.outside) {
+            *y = above[from as usize];
+        }
+        self.on_processor(false);
+        if let Some([low, high]) = self.halves.as_deref_mut() {
+            let above = &self.memory;
+            threads::join(true, || low.go_down(above), || high.go_down(above));
+        }
+    }
+
+    /// Puts the unknowns where they stand among all.
+    fn hand_out(&self, x: &mut [f64]) {
+        for half in self.halves.as_deref().into_iter().flatten() {
+            half.hand_out(x);
+        }
+        for (y, &to) in self.memory.iter().zip(&self.unknowns) {
+            x[to as usize] = *y;
+        }
+    }
+
+    /// Without instructions of some processors, on one subtree.
+    #[cfg(test)]
+    pub(super) fn substitute_plainly(&mut self, x: &mut [f64]) {
+        assert!(self.halves.is_none());
+        for (y, &from) in self.memory.iter_mut().zip(&self.unknowns) {
+            *y = x[from as usize];
+        }
+        self.substitute_by::<Plain>(true);
+        self.substitute_by::<Plain>(false);
+        self.hand_out(x);
+    }
+
+    fn on_processor(&mut self, is_up: bool) {
         #[cfg(target_arch = "x86_64")]
         {
             if std::arch::is_x86_feature_detected!("avx512f")
                 && std::arch::is_x86_feature_detected!("avx512vl")
             {
                 // SAFETY: the processor has been asked for AVX-512 F and VL.
-                return unsafe { self.substitute_avx512(x) };
+                return unsafe { self.substitute_avx512(is_up) };
             }
             if std::arch::is_x86_feature_detected!("avx2") {
                 // SAFETY: the processor has been asked for AVX2.
-                return unsafe { self.substitute_avx2(x) };
+                return unsafe { self.substitute_avx2(is_up) };
             }
         }
-        self.substitute_by::<Plain>(x);
+        self.substitute_by::<Plain>(is_up);
     }
 
     /// The substitution compiled for AVX2.
@@ -139,8 +269,8 @@ impl Panels {
     /// The processor must have AVX2.
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
-    unsafe fn substitute_avx2(&mut self, x: &mut [f64]) {
-        self.substitute_by::<Plain>(x);
+    unsafe fn substitute_avx2(&mut self, is_up: bool) {
+        self.substitute_by::<Plain>(is_up);
     }
 
     /// The substitution compiled for AVX-512.
@@ -149,12 +279,22 @@ impl Panels {
     /// The processor must have AVX-512 (F, VL).
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2,avx512f,avx512vl")]
-    unsafe fn substitute_avx512(&mut self, x: &mut [f64]) {
-        self.substitute_by::<Wide>(x);
+    unsafe fn substitute_avx512(&mut self, is_up: bool) {
+        self.substitute_by::<Wide>(is_up);
     }
 
     #[inline(always)]
-    pub(super) fn substitute_by<L: Lanes>(&mut self, x: &mut [f64]) {
+    fn substitute_by<L: Lanes>(&mut self, is_up: bool) {
+        if is_up {
+            self.forwards_by::<L>();
+        } else {
+            self.backwards_by::<L>();
+        }
+    }
+
+    #[inline(always)]
+    fn forwards_by<L: Lanes>(&mut self) {
+        let x = self.memory.as_mut_slice();
         let mut place = 0;
         for node in &self.supernodes {
             let (first, columns) = (node.first as usize, node.columns as usize);
@@ -189,6 +329,12 @@ impl Panels {
                 x[row as usize] += change;
             }
         }
+    }
+
+    #[inline(always)]
+    fn backwards_by<L: Lanes>(&mut self) {
+        let x = self.memory.as_mut_slice();
+        let mut place = self.values.len();
         for node in self.supernodes.iter().rev() {
             let (first, columns) = (node.first as usize, node.columns as usize);
             let rows = &self.rows[node.rows_from as usize..][..node.rows as usize];

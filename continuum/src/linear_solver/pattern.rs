@@ -1,6 +1,11 @@
 //! The pattern of a sparse matrix that is a sum of dense blocks.
 
+use std::ops::Range;
+use std::sync::atomic::{AtomicU32, Ordering};
+
 use faer::sparse::SymbolicSparseColMat;
+
+use crate::threads;
 
 /// Dense blocks, each given by its rows and columns, that a matrix is the sum of.
 #[derive(Debug, Clone, Default)]
@@ -70,37 +75,55 @@ impl Blocks {
             first_slot += rows * columns;
             begin = end;
         }
-        let mut slots = vec![0_u32; self.coefficients];
-        let mut starts = vec![0; size + 1];
-        let mut rows: Vec<usize> = Vec::with_capacity(self.coefficients / 4);
-        // Where in the present column a row stands; the column it was last met in.
-        let mut place = vec![0_u32; size];
-        let mut met_in = vec![u32::MAX; size];
-        for column in 0..size {
-            let first = rows.len();
-            let members = &members[ends[column] as usize..ends[column + 1] as usize];
-            for member in members {
-                for &row in &self.rows[member.rows[0] as usize..member.rows[1] as usize] {
-                    let met_in = &mut met_in[row as usize];
-                    if *met_in != column as u32 {
-                        *met_in = column as u32;
-                        rows.push(row as usize);
+        // Columns are looked at in two halves, where there are many. A coefficient belongs to one column.
+        let slots: Vec<AtomicU32> = (0..self.coefficients).map(|_| AtomicU32::new(0)).collect();
+        let members_of = |column: usize| &members[ends[column] as usize..ends[column + 1] as usize];
+        let rows_of = |columns: Range<usize>| {
+            let mut rows: Vec<usize> = Vec::with_capacity(self.coefficients / 4);
+            let mut ends = Vec::with_capacity(columns.len());
+            // The column that a row was last met in.
+            let mut met_in = vec![u32::MAX; size];
+            for column in columns {
+                let first = rows.len();
+                for member in members_of(column) {
+                    for &row in &self.rows[member.rows[0] as usize..member.rows[1] as usize] {
+                        let met_in = &mut met_in[row as usize];
+                        if *met_in != column as u32 {
+                            *met_in = column as u32;
+                            rows.push(row as usize);
+                        }
+                    }
+                }
+                rows[first..].sort_unstable();
+                ends.push(rows.len());
+            }
+            (rows, ends)
+        };
+        let pays = size >= threads::MANY;
+        let middle = if pays { size / 2 } else { size };
+        let ((mut rows, mut starts), (more, later)) =
+            threads::join(pays, || rows_of(0..middle), || rows_of(middle..size));
+        starts.insert(0, 0);
+        starts.extend(later.iter().map(|end| rows.len() + end));
+        rows.extend(more);
+        let set_slots = |columns: Range<usize>| {
+            // Where in the present column a row stands.
+            let mut place = vec![0_u32; size];
+            for column in columns {
+                for slot in starts[column]..starts[column + 1] {
+                    place[rows[slot]] = slot as u32;
+                }
+                for member in members_of(column) {
+                    let mut slot = member.first_slot as usize;
+                    for &row in &self.rows[member.rows[0] as usize..member.rows[1] as usize] {
+                        slots[slot].store(place[row as usize], Ordering::Relaxed);
+                        slot += member.step as usize;
                     }
                 }
             }
-            rows[first..].sort_unstable();
-            for (offset, &row) in rows[first..].iter().enumerate() {
-                place[row] = (first + offset) as u32;
-            }
-            for member in members {
-                let mut slot = member.first_slot as usize;
-                for &row in &self.rows[member.rows[0] as usize..member.rows[1] as usize] {
-                    slots[slot] = place[row as usize];
-                    slot += member.step as usize;
-                }
-            }
-            starts[column + 1] = rows.len();
-        }
+        };
+        threads::join(pays, || set_slots(0..middle), || set_slots(middle..size));
+        let slots = slots.into_iter().map(AtomicU32::into_inner).collect();
         let pattern = SymbolicSparseColMat::new_checked(size, size, starts, None, rows);
         (pattern, slots)
     }

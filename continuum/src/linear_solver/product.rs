@@ -1,6 +1,13 @@
 //! The product of the matrix of a step with a vector, from half of its symmetric block.
 
+use std::ops::Range;
+
 use faer::sparse::SymbolicSparseColMat;
+
+use crate::threads;
+
+/// Coefficients that are looked up by one thread.
+const AT_A_TIME: usize = 16_384;
 
 /// The coefficients of [[K, B], [C, 0]] without what K has above its diagonal.
 pub(super) struct Product {
@@ -10,6 +17,10 @@ pub(super) struct Product {
     /// Where each coefficient stands among all.
     slots: Vec<u32>,
     values: Vec<f64>,
+    /// The columns from this one on are the second half,
+    middle: usize,
+    /// which makes a sum of its own.
+    second: Vec<f64>,
 }
 
 impl Product {
@@ -34,7 +45,15 @@ impl Product {
             begins.push(begin);
         }
         begins.push([rows.len() as u32; 2]);
+        let size = begins.len() - 1;
+        let middle = if size < threads::MANY {
+            size
+        } else {
+            begins.partition_point(|begin| 2 * (begin[0] as usize) < rows.len())
+        };
         Self {
+            middle,
+            second: vec![0.0; if middle < size { size } else { 0 }],
             begins,
             values: vec![0.0; rows.len()],
             rows,
@@ -44,15 +63,38 @@ impl Product {
 
     /// Takes the coefficients of now.
     pub(super) fn load(&mut self, values: &[f64]) {
-        for (value, &slot) in self.values.iter_mut().zip(&self.slots) {
-            *value = values[slot as usize];
-        }
+        let slots = &self.slots;
+        threads::over(&mut self.values, AT_A_TIME, &|first, here| {
+            for (value, &slot) in here.iter_mut().zip(&slots[first..]) {
+                *value = values[slot as usize];
+            }
+        });
     }
 
     /// y = A x.
-    pub(super) fn multiply(&self, x: &[f64], y: &mut [f64]) {
+    pub(super) fn multiply(&mut self, x: &[f64], y: &mut [f64]) {
+        let mut second = std::mem::take(&mut self.second);
+        let (one, other) = (0..self.middle, self.middle..x.len());
+        if other.is_empty() {
+            self.multiply_columns(one, x, y);
+        } else {
+            threads::join(
+                true,
+                || self.multiply_columns(one, x, y),
+                || self.multiply_columns(other, x, &mut second),
+            );
+            for (y, second) in y.iter_mut().zip(&second) {
+                *y += second;
+            }
+        }
+        self.second = second;
+    }
+
+    /// What some columns contribute to A x.
+    fn multiply_columns(&self, columns: Range<usize>, x: &[f64], y: &mut [f64]) {
         y.fill(0.0);
-        for (column, pair) in self.begins.windows(2).enumerate() {
+        let begins = self.begins[columns.start..=columns.end].windows(2);
+        for (column, pair) in columns.zip(begins) {
             let [symmetric, others, end] = [pair[0][0], pair[0][1], pair[1][0]].map(|n| n as usize);
             let here = x[column];
             let mut sum = 0.0;

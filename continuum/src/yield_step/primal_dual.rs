@@ -29,7 +29,8 @@ use super::{
 use crate::discretisation::{COMPONENTS, Discretisation};
 use crate::error::Error;
 use crate::rheology::{Rheology, squared_norm, strain_rate_norm};
-use evaluation::Evaluation;
+use crate::threads;
+use evaluation::{Evaluation, POINTS};
 use part::Outcome;
 
 /// Settings of [`PrimalDual`]; times and lengths in natural units.
@@ -146,6 +147,28 @@ impl<const C: usize> Default for LinearisedPoint<C> {
     }
 }
 
+impl<const C: usize> LinearisedPoint<C> {
+    fn set(&mut self, evaluation: &Evaluation<C>, s: &[f64; C]) {
+        let Evaluation {
+            gamma,
+            rate,
+            threshold,
+            ..
+        } = evaluation;
+        let viscosity = threshold.stress / rate;
+        let inverse_square = 1.0 / (rate * rate);
+        for a in 0..C {
+            self.stress[a] = viscosity * gamma[a];
+            self.by_pressure[a] = threshold.by_pressure * gamma[a] / rate;
+            for b in 0..C {
+                self.by_rate[a][b] =
+                    (threshold.by_rate * gamma[a] - s[a]) * gamma[b] * inverse_square;
+            }
+            self.by_rate[a][a] += viscosity;
+        }
+    }
+}
+
 /// How an attempt begins and descends.
 struct Strategy {
     first_floor: f64,
@@ -154,6 +177,17 @@ struct Strategy {
     line_search: bool,
     /// Whether what is left in few places is solved there by itself.
     solves_parts: bool,
+}
+
+/// How one iteration of an attempt is made.
+struct Iteration {
+    is_first: bool,
+    floor: f64,
+    /// Relative residual of the linear system.
+    tolerance: f64,
+    /// Whether factors of the iteration before may serve.
+    keeps_factors: bool,
+    line_search: bool,
 }
 
 /// The default solver of time steps. It holds the matrix and the work arrays of one grid.
@@ -233,13 +267,14 @@ impl<const C: usize> PrimalDual<C> {
         )?;
         let velocities = discretisation.velocities();
         let cells = discretisation.cells();
+        let pays = velocities + cells >= threads::MANY;
+        let matrix = threads::with_help(pays, || {
+            let (tolerance, solver) = (options.linear_tolerance, options.linear_solver);
+            StepMatrix::new(discretisation, tolerance, solver)
+        })?;
         Ok(Self {
             options,
-            matrix: StepMatrix::new(
-                discretisation,
-                options.linear_tolerance,
-                options.linear_solver,
-            )?,
+            matrix,
             trial: FlowState::at_rest(discretisation, vec![0.0; cells]),
             points: vec![LinearisedPoint::default(); discretisation.points().len()],
             released: vec![false; cells],
@@ -280,6 +315,7 @@ impl<const C: usize> PrimalDual<C> {
         // The pressure that a stress was found with may not be that which is interpolated now.
         self.evaluate(problem, floor);
         self.bring_stress_to_threshold();
+        let pays = self.right_hand_side.len() >= threads::MANY;
         // In space mirrored flows are to stay alike, to which loose systems and choices do not contribute.
         let keeps = D == 2;
         let solves_parts = strategy.solves_parts
@@ -297,34 +333,21 @@ impl<const C: usize> PrimalDual<C> {
         // What was left over what is allowed when the count of changes to and fro began.
         let mut left_when_counting = f64::INFINITY;
         for iteration in 0..strategy.max_iterations {
-            self.release(problem.discretisation, iteration == 0);
-            self.linearise(problem, floor);
-            self.assemble(problem, u_old);
             report.iterations += 1;
             report.linear_solves += 1;
-            let clock = Instant::now();
-            let system = &mut self.matrix.system;
-            let prepared = if keeps && floor == floor_of_factors {
-                system.keep_or_factorise()
-            } else {
-                system.factorise()
+            let this = Iteration {
+                is_first: iteration == 0,
+                floor,
+                tolerance,
+                keeps_factors: keeps && floor == floor_of_factors,
+                line_search: strategy.line_search,
             };
             floor_of_factors = floor;
-            let solved = prepared
-                .and_then(|()| system.solve(&self.right_hand_side, &mut self.change, tolerance));
-            let factors = system.take_factor_time();
-            self.times.factors += factors;
-            self.times.krylov += clock.elapsed().as_secs_f64() - factors;
-            if solved.is_err() {
+            let Some(fraction) =
+                threads::with_help(pays, || self.iterate(problem, u_old, &this, report))
+            else {
                 return;
-            }
-            let fraction = if strategy.line_search {
-                self.line_search(problem, u_old, floor)
-            } else {
-                1.0
             };
-            self.update(problem, floor, fraction);
-            report.residuals = self.residuals(problem, u_old, floor);
             let is_last_floor = floor <= self.options.strain_rate_floor;
             let mut allowed = given.copied().unwrap_or_else(|| self.tolerances(problem));
             for _ in 0..MOST_PARTS {
@@ -382,6 +405,40 @@ impl<const C: usize> PrimalDual<C> {
         }
     }
 
+    /// One iteration of the whole: the part of the change that was made, or none if there was no linear solution.
+    fn iterate<R: Rheology, const D: usize, const V: usize>(
+        &mut self,
+        problem: &StepProblem<'_, R, D, C, V>,
+        u_old: &[f64],
+        this: &Iteration,
+        report: &mut StepReport,
+    ) -> Option<f64> {
+        self.release(problem.discretisation, this.is_first);
+        self.linearise(problem, this.floor);
+        self.assemble(problem, u_old);
+        let clock = Instant::now();
+        let system = &mut self.matrix.system;
+        let prepared = if this.keeps_factors {
+            system.keep_or_factorise()
+        } else {
+            system.factorise()
+        };
+        let (right_hand_side, change) = (&self.right_hand_side, &mut self.change);
+        let solved = prepared.and_then(|()| system.solve(right_hand_side, change, this.tolerance));
+        let factors = system.take_factor_time();
+        self.times.factors += factors;
+        self.times.krylov += clock.elapsed().as_secs_f64() - factors;
+        solved.ok()?;
+        let fraction = if this.line_search {
+            self.line_search(problem, u_old, this.floor)
+        } else {
+            1.0
+        };
+        self.update(problem, this.floor, fraction);
+        report.residuals = self.residuals(problem, u_old, this.floor);
+        Some(fraction)
+    }
+
     /// Relative residual to which the next linear system is solved: a part of what is left of the way, by which the
     /// iteration loses nothing (Eisenstat & Walker, *SIAM J. Sci. Comput.* 17 (1996) 16).
     fn forcing(&self, allowed: &Residuals, found: &Residuals) -> f64 {
@@ -400,26 +457,15 @@ impl<const C: usize> PrimalDual<C> {
         floor: f64,
     ) {
         self.evaluate(problem, floor);
-        let states = self.evaluations.iter().zip(&self.trial.s);
-        for (q, (linear, (evaluation, s))) in self.points.iter_mut().zip(states).enumerate() {
-            let Evaluation {
-                gamma,
-                rate,
-                threshold,
-                is_pressed,
-            } = *evaluation;
-            self.conflicts.note_point(q, is_pressed);
-            let viscosity = threshold.stress / rate;
-            let inverse_square = 1.0 / (rate * rate);
-            for a in 0..C {
-                linear.stress[a] = viscosity * gamma[a];
-                linear.by_pressure[a] = threshold.by_pressure * gamma[a] / rate;
-                for b in 0..C {
-                    linear.by_rate[a][b] =
-                        (threshold.by_rate * gamma[a] - s[a]) * gamma[b] * inverse_square;
-                }
-                linear.by_rate[a][a] += viscosity;
+        let (evaluations, stresses) = (&self.evaluations, &self.trial.s);
+        threads::over(&mut self.points, POINTS, &|first, points| {
+            let states = evaluations[first..].iter().zip(&stresses[first..]);
+            for (linear, (evaluation, s)) in points.iter_mut().zip(states) {
+                linear.set(evaluation, s);
             }
+        });
+        for (q, evaluation) in self.evaluations.iter().enumerate() {
+            self.conflicts.note_point(q, evaluation.is_pressed);
         }
     }
 
@@ -431,42 +477,49 @@ impl<const C: usize> PrimalDual<C> {
         u_old: &[f64],
     ) {
         let discretisation = problem.discretisation;
-        let linear = &self.points;
-        self.matrix
-            .fill(discretisation, problem.dt, &self.released, |q| {
-                let by_rate = &linear[q].by_rate;
-                let c = std::array::from_fn(|a| {
-                    std::array::from_fn(|b| 0.5 * (by_rate[a][b] + by_rate[b][a]))
+        let (linear, trial, released) = (&self.points, &self.trial, &self.released);
+        let (matrix, right_hand_side) = (&mut self.matrix, &mut self.right_hand_side);
+        threads::join(
+            linear.len() >= threads::WORTH_HALVING * POINTS,
+            || {
+                matrix.fill(discretisation, problem.dt, released, |q| {
+                    let by_rate = &linear[q].by_rate;
+                    let c = std::array::from_fn(|a| {
+                        std::array::from_fn(|b| 0.5 * (by_rate[a][b] + by_rate[b][a]))
+                    });
+                    (c, linear[q].by_pressure)
                 });
-                (c, linear[q].by_pressure)
-            });
-        let velocities = discretisation.velocities();
-        let (momentum, continuity) = self.right_hand_side.split_at_mut(velocities);
-        let mass = discretisation.mass();
-        for (j, r) in momentum.iter_mut().enumerate() {
-            *r = problem.load[j] - mass[j] * (self.trial.u[j] - u_old[j]) / problem.dt;
-        }
-        for (point, linear) in discretisation.points().iter().zip(&self.points) {
-            for (slot, &j) in point.velocities().iter().enumerate() {
-                momentum[j] -= point.weight * point.force(slot, &linear.stress);
-            }
-        }
-        let forces = discretisation
-            .divergence()
-            .iter()
-            .zip(discretisation.gradient());
-        for (&(cell, j, _), force) in forces {
-            momentum[j] += force * self.trial.p[cell];
-        }
-        let volume = discretisation.grid().cell_volume();
-        for ((r, p), _) in continuity
-            .iter_mut()
-            .zip(&self.trial.p)
-            .zip(&self.released)
-            .filter(|(_, released)| **released)
-        {
-            *r = volume * p;
-        }
+            },
+            || {
+                let velocities = discretisation.velocities();
+                let (momentum, continuity) = right_hand_side.split_at_mut(velocities);
+                let mass = discretisation.mass();
+                for (j, r) in momentum.iter_mut().enumerate() {
+                    *r = problem.load[j] - mass[j] * (trial.u[j] - u_old[j]) / problem.dt;
+                }
+                for (point, linear) in discretisation.points().iter().zip(linear) {
+                    for (slot, &j) in point.velocities().iter().enumerate() {
+                        momentum[j] -= point.weight * point.force(slot, &linear.stress);
+                    }
+                }
+                let forces = discretisation
+                    .divergence()
+                    .iter()
+                    .zip(discretisation.gradient());
+                for (&(cell, j, _), force) in forces {
+                    momentum[j] += force * trial.p[cell];
+                }
+                let volume = discretisation.grid().cell_volume();
+                for ((r, p), _) in continuity
+                    .iter_mut()
+                    .zip(&trial.p)
+                    .zip(released)
+                    .filter(|(_, released)| **released)
+                {
+                    *r = volume * p;
+                }
+            },
+        );
     }
 
     /// Decides which cells let go: those that would have to be pulled together to keep their
@@ -534,18 +587,22 @@ impl<const C: usize> PrimalDual<C> {
     ) {
         let (du, dp) = self.change.split_at(self.trial.u.len());
         let points = problem.discretisation.points();
-        for ((point, linear), s) in points.iter().zip(&self.points).zip(&mut self.trial.s) {
-            let rate = point.strain_rate_change(du);
-            let pressure = point.pressure_change(dp);
-            for (a, s) in s.iter_mut().enumerate() {
-                let mut target = linear.stress[a];
-                for (by_rate, rate) in linear.by_rate[a].iter().zip(&rate) {
-                    target += by_rate * rate;
+        let linear = &self.points;
+        threads::over(&mut self.trial.s, POINTS, &|first, stresses| {
+            let points = points[first..].iter().zip(&linear[first..]);
+            for ((point, linear), s) in points.zip(stresses) {
+                let rate = point.strain_rate_change(du);
+                let pressure = point.pressure_change(dp);
+                for (a, s) in s.iter_mut().enumerate() {
+                    let mut target = linear.stress[a];
+                    for (by_rate, rate) in linear.by_rate[a].iter().zip(&rate) {
+                        target += by_rate * rate;
+                    }
+                    target += linear.by_pressure[a] * pressure;
+                    *s += fraction * (target - *s);
                 }
-                target += linear.by_pressure[a] * pressure;
-                *s += fraction * (target - *s);
             }
-        }
+        });
         for (u, d) in self.trial.u.iter_mut().zip(du) {
             *u += fraction * d;
         }
@@ -586,22 +643,22 @@ impl<const C: usize> PrimalDual<C> {
         let divergence = self.continuity_residual(problem.discretisation);
         self.evaluate(problem, floor);
         let momentum = &mut self.right_hand_side[..self.trial.u.len()];
-        let mut stress = 0.0;
-        let states = self.evaluations.iter().zip(&self.trial.s);
-        for ((evaluation, s), kept) in states.zip(&mut self.misses) {
-            let Evaluation {
-                gamma,
-                rate,
-                threshold,
-                ..
-            } = *evaluation;
-            let miss: [f64; C] = std::array::from_fn(|a| s[a] * rate - threshold.stress * gamma[a]);
-            let scale = rate * (threshold.stress + 1e-3);
-            *kept = strain_rate_norm(miss) / scale;
-            stress = largest_or_nan(stress, *kept);
-        }
+        let (evaluations, trial, misses) = (&self.evaluations, &self.trial, &mut self.misses);
+        let (momentum, stress) = threads::join(
+            evaluations.len() >= threads::WORTH_HALVING * POINTS,
+            || momentum_residual(problem, u_old, trial, momentum),
+            || {
+                let mut stress = 0.0;
+                let states = evaluations.iter().zip(&trial.s);
+                for ((evaluation, s), kept) in states.zip(misses) {
+                    *kept = evaluation.miss(s);
+                    stress = largest_or_nan(stress, *kept);
+                }
+                stress
+            },
+        );
         Residuals {
-            momentum: momentum_residual(problem, u_old, &self.trial, momentum),
+            momentum,
             divergence,
             stress,
             strain_rate_floor: floor,

@@ -266,7 +266,7 @@ pub(super) fn summary<const D: usize, const C: usize>(
         dt_limit: "courant, with solver.largest_step_scaled".into(),
         left_out: left_out.iter().copied().map(String::from).collect(),
     };
-    summary.cost = Cost::measured(wall_s, 1, 0, cell_steps);
+    summary.cost = Cost::measured(wall_s, under.threads, 0, cell_steps);
     summary.ledger.mass_relative = flow.volume_drift();
     let mut arrays = vec![state.fractions.as_slice()];
     arrays.extend(state.velocity.iter().map(Vec::as_slice));

@@ -35,9 +35,12 @@ const FIGURES: [&str; 3] = ["run-out", "deposit", "height of the deposit"];
 const WIDER: f64 = 1.5;
 const FINER: f64 = 0.5;
 
+/// Places and heights of a heap (m).
+type Heap = (Vec<f64>, Vec<f64>);
+
 /// A finished run.
 struct Ran {
-    deposit: (Vec<f64>, Vec<f64>),
+    deposit: Heap,
     summary: Summary,
 }
 
@@ -54,7 +57,7 @@ impl Ran {
 }
 
 /// Differences of a deposit from another one, by [`FIGURES`]; the foot of the column lies at `width` (m).
-fn differences(own: &(Vec<f64>, Vec<f64>), other: &(Vec<f64>, Vec<f64>), width: f64) -> [f64; 3] {
+fn differences(own: &Heap, other: &Heap, width: f64) -> [f64; 3] {
     let [place, reference] = [own, other].map(|heap| place_of_share(&heap.0, &heap.1, SHARE));
     let [top, least] = [own, other].map(|heap| heap.1.iter().copied().fold(0.0, f64::max));
     [
@@ -271,7 +274,7 @@ pub(super) fn run(options: &Options) -> Result<Found, Failure> {
 }
 
 /// The deposit of the continuum that the grains' run has set beside them.
-fn continuum(folder: &Path, grains: &Ran) -> Result<Option<(Vec<f64>, Vec<f64>)>, Failure> {
+fn continuum(folder: &Path, grains: &Ran) -> Result<Option<Heap>, Failure> {
     if !grains.value("continuum_runout_scaled").is_finite() {
         return Ok(None);
     }

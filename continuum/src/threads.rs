@@ -1,0 +1,155 @@
+//! Work side by side on the threads of the caller's pool.
+//!
+//! Threads of a pool go to sleep when there is nothing to do, and to wake one takes longer than most of what is done side by
+//! side in a step. So those that may help stand by awake during an iteration on a step's equations ([`with_help`]).
+//!
+//! A caller inside a pool of rayon's (`ThreadPool::install`) gets its threads; any other has one. What is done side by
+//! side is cut by what there is to do, never by the number of threads, and every sum has one order, so that the bits do
+//! not depend on how many there are.
+
+use std::sync::atomic::{AtomicBool, Ordering};
+
+/// From so many unknowns on it pays to share what takes tens of microseconds.
+pub(crate) const MANY: usize = 3000;
+/// Items are shared from so many times on what is done at a time.
+pub(crate) const WORTH_HALVING: usize = 3;
+/// Most threads that stand by.
+const HELPERS: usize = 3;
+/// Looks for something to do before others are given way to.
+const PATIENCE: u32 = 64;
+
+/// Does both, side by side where `pays` and there is a thread for it.
+#[inline]
+pub(crate) fn join<A: Send, B: Send>(
+    pays: bool,
+    a: impl FnOnce() -> A + Send,
+    b: impl FnOnce() -> B + Send,
+) -> (A, B) {
+    if pays && are_many() {
+        #[cfg(test)]
+        let (a, b) = counted(a, b);
+        rayon::join(a, b)
+    } else {
+        (a(), b())
+    }
+}
+
+/// Whether the caller's pool has more threads than one.
+pub(crate) fn are_many() -> bool {
+    rayon::current_thread_index().is_some() && rayon::current_num_threads() > 1
+}
+
+/// Works on items side by side, so many of them at a time where there are several times as many, given the number of the
+/// first.
+pub(crate) fn over<T: Send>(
+    items: &mut [T],
+    at_a_time: usize,
+    work: &(impl Fn(usize, &mut [T]) + Sync),
+) {
+    fn halve<T: Send>(
+        items: &mut [T],
+        first: usize,
+        at_a_time: usize,
+        work: &(impl Fn(usize, &mut [T]) + Sync),
+    ) {
+        if items.len() <= at_a_time {
+            return work(first, items);
+        }
+        let middle = items.len().div_ceil(2 * at_a_time) * at_a_time;
+        let (low, high) = items.split_at_mut(middle);
+        join(
+            true,
+            || halve(low, first, at_a_time, work),
+            || halve(high, first + middle, at_a_time, work),
+        );
+    }
+    if items.len() >= WORTH_HALVING * at_a_time && are_many() {
+        halve(items, 0, at_a_time, work);
+    } else {
+        work(0, items);
+    }
+}
+
+/// Does some work while other threads of the pool stand by awake to take a share of it.
+pub(crate) fn with_help<T: Send>(pays: bool, work: impl FnOnce() -> T + Send) -> T {
+    if !pays || !are_many() {
+        return work();
+    }
+    let team = Team {
+        worker: rayon::current_thread_index(),
+        is_over: AtomicBool::new(false),
+    };
+    let helpers = HELPERS.min(rayon::current_num_threads() - 1);
+    let work = || {
+        let _release = Release(&team);
+        work()
+    };
+    rayon::join(work, || team.stand_by(helpers)).0
+}
+
+/// Threads that stand by.
+struct Team {
+    /// The thread that works.
+    worker: Option<usize>,
+    is_over: AtomicBool,
+}
+
+/// Lets the helpers go, whatever happens.
+struct Release<'a>(&'a Team);
+
+impl Drop for Release<'_> {
+    fn drop(&mut self) {
+        self.0.is_over.store(true, Ordering::Release);
+    }
+}
+
+impl Team {
+    fn stand_by(&self, helpers: usize) {
+        if helpers > 1 {
+            rayon::join(|| self.help(), || self.stand_by(helpers - 1));
+        } else {
+            self.help();
+        }
+    }
+
+    /// Does what there is to do in the pool until the work is over.
+    fn help(&self) {
+        // The worker, while it waits for a helper, may come to this itself, and would wait for its own end.
+        if rayon::current_thread_index() == self.worker {
+            return;
+        }
+        let mut looks = 0;
+        while !self.is_over.load(Ordering::Acquire) {
+            if rayon::yield_now() == Some(rayon::Yield::Executed) {
+                looks = 0;
+                continue;
+            }
+            looks += 1;
+            if looks < PATIENCE {
+                std::hint::spin_loop();
+            } else {
+                looks = 0;
+                std::thread::yield_now();
+            }
+        }
+    }
+}
+
+/// Both, of which the second notes whether another thread has it.
+#[cfg(test)]
+fn counted<A: Send, B: Send>(
+    a: impl FnOnce() -> A + Send,
+    b: impl FnOnce() -> B + Send,
+) -> (impl FnOnce() -> A + Send, impl FnOnce() -> B + Send) {
+    let caller = rayon::current_thread_index();
+    let b = move || {
+        if rayon::current_thread_index() != caller {
+            tests::TAKEN.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
+        }
+        b()
+    };
+    (a, b)
+}
+
+#[cfg(test)]
+mod tests;
