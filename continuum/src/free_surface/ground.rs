@@ -32,6 +32,7 @@ mod layers;
 mod operators;
 mod points;
 pub(crate) mod settling;
+pub(crate) mod shores;
 mod transport;
 
 use serde::{Deserialize, Serialize};
