@@ -17,7 +17,6 @@ mod multigrid;
 mod open_ends;
 mod outside;
 mod sheared_layers;
-mod shores;
 mod space;
 mod steep_ground;
 mod terrain;

@@ -32,7 +32,6 @@ mod layers;
 mod operators;
 mod points;
 pub(crate) mod settling;
-pub(crate) mod shores;
 mod transport;
 
 use serde::{Deserialize, Serialize};

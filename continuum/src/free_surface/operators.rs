@@ -9,7 +9,6 @@
 
 use super::faces::{ACTIVE, ALIKE, Face, Faces, weight_onto};
 use super::fraction::volume_in;
-use super::ground::shores::Shores;
 use super::open_ends::Inflow;
 use super::outside::Outside;
 use super::plane::Plane;
@@ -25,8 +24,6 @@ use crate::wall_friction::{PointLaw, SideWalls};
 
 /// Smallest θ in the pressure gradient and in the pressure at walls.
 const NEAREST_SURFACE: f64 = 0.005;
-/// Largest θ there, along a level surface over ground.
-const FARTHEST_SURFACE: f64 = 1e15;
 /// Smallest θ in the extrapolation of pressure beyond the surface.
 pub(super) const NEAREST_EXTRAPOLATION: f64 = 0.25;
 /// An axis along which gravity has less than this part of all of it lies across upright faces.
@@ -49,8 +46,6 @@ pub(crate) struct Material<'a, const D: usize = DIMENSIONS, const C: usize = COM
     pub topology: &'a Topology<D>,
     pub fractions: &'a [f64],
     pub planes: &'a [Option<Plane>],
-    /// The surface where it meets ground.
-    pub shores: &'a Shores,
     pub faces: &'a Faces<D>,
     /// Walls beside the plane, which rub.
     pub side_walls: Option<SideWalls>,
@@ -136,7 +131,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
 
     /// The surface in a cell. In space dust has none: where some of it lies is a matter of round-off.
     fn plane(&self, cell: usize) -> Option<&Plane> {
-        let plane = self.shores.plane(cell).or(self.planes[cell].as_ref());
+        let plane = self.planes[cell].as_ref();
         plane.filter(|_| D == 2 || self.fractions[cell] > EMPTY)
     }
 
@@ -161,9 +156,6 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         };
         if inner <= 0.0 {
             NEAREST_SURFACE
-        } else if outer >= 0.0 && self.faces.shares.is_some() {
-            // The centre of a cell that holds little above ground: the pressure goes on to it as the depth does.
-            inner / (inner - outer).max(inner / FARTHEST_SURFACE)
         } else if outer >= 0.0 {
             1.0
         } else {

@@ -42,9 +42,6 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                         *plane = None;
                     }
                 }
-                let planes = &self.planes;
-                self.shores
-                    .find(ground, &self.topology, fractions, planes, acceleration);
                 faces_over(ground, &self.topology, fractions, acceleration, thin_layer)
             }
         };
@@ -56,7 +53,6 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             topology: &self.topology,
             fractions,
             planes: &self.planes,
-            shores: &self.shores,
             faces: &faces,
             side_walls: self.side_walls,
             inflow: self.inflow.as_ref(),

@@ -21,8 +21,6 @@ use crate::wall_friction::PointLaw;
 
 /// Cells with less material count as empty beside a thin layer.
 pub(super) const EMPTY: f64 = 1e-9;
-/// Less ground than this part of a cell does not stand out of matter.
-const STANDS_OUT: f64 = 1e-9;
 
 /// How a thin layer lies on a slope, seen from the component of one of its unknowns.
 #[derive(Debug, Clone, Copy, PartialEq)]
@@ -116,6 +114,25 @@ impl<const D: usize> Ground<D> {
         }
         sums
     }
+
+    /// Rise of the surface of a thin layer across a face, in cells along `axis`. Ground that stands out
+    /// beside it does not push it.
+    pub(crate) fn surface_rise(
+        &self,
+        topology: &Topology<D>,
+        fractions: &[f64],
+        axis: usize,
+        [low, high]: [usize; 2],
+    ) -> f64 {
+        let [[low_filled, low_level], [high_filled, high_level]] =
+            [low, high].map(|cell| self.thickness(topology, fractions, axis, cell));
+        let rise = high_level - low_level;
+        if (high_filled <= EMPTY && rise > 0.0) || (low_filled <= EMPTY && rise < 0.0) {
+            0.0
+        } else {
+            rise
+        }
+    }
 }
 
 impl<const D: usize, const C: usize> Material<'_, D, C> {
@@ -134,42 +151,6 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         })
     }
 
-    /// Rise of the surface of a thin layer across a face, in cells along `axis`. Ground that stands out
-    /// beside it does not push it.
-    fn surface_rise(&self, ground: &Ground<D>, axis: usize, [low, high]: [usize; 2]) -> f64 {
-        let [[low_filled, low_level], [high_filled, high_level]] = [low, high].map(|cell| {
-            let [filled, level] = ground.thickness(self.topology, self.fractions, axis, cell);
-            [
-                filled,
-                self.level_at_shore(ground, axis, cell).unwrap_or(level),
-            ]
-        });
-        let rise = high_level - low_level;
-        if (high_filled <= EMPTY && rise > 0.0) || (low_filled <= EMPTY && rise < 0.0) {
-            0.0
-        } else {
-            rise
-        }
-    }
-
-    /// Height of the surface in a column of three cells with one in the middle, from its foot, where ground stands out of
-    /// the matter in one of them.
-    fn level_at_shore(&self, ground: &Ground<D>, axis: usize, cell: usize) -> Option<f64> {
-        let [below, above] = self.topology.cell_neighbours[cell][axis];
-        let column = [below, cell, above].into_iter().enumerate();
-        column.filter(|&(_, at)| at != NONE).find_map(|(row, at)| {
-            let plane = self.shores.plane(at)?;
-            let both = self.fractions[at] + ground.solid[at];
-            let stands_out = both - plane.volume_in([0.0; 3], [1.0; 3]) > STANDS_OUT;
-            let steep = plane.normal[axis];
-            (stands_out && steep > 0.0).then(|| {
-                let mut foot = [0.5; 3];
-                foot[axis] = 0.0;
-                row as f64 + plane.depth(foot) / steep
-            })
-        })
-    }
-
     /// f at a face of a component, on a slope.
     fn force_on_layer(
         &self,
@@ -180,7 +161,8 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
     ) -> [f64; D] {
         let spacing = |axis: usize| self.grid.axes()[axis].spacing();
         let rise = |low: usize, high: usize, along: usize| {
-            self.surface_rise(ground, slope.axis, [low, high]) * spacing(slope.axis)
+            ground.surface_rise(self.topology, self.fractions, slope.axis, [low, high])
+                * spacing(slope.axis)
                 / spacing(along)
         };
         let [low, high] = self.topology.face_cells[component][face];
