@@ -1,7 +1,8 @@
 //! Work side by side on the threads of the caller's pool.
 //!
 //! Threads of a pool go to sleep when there is nothing to do, and to wake one takes longer than most of what is done side by
-//! side in a step. So those that may help stand by awake during an iteration on a step's equations ([`with_help`]).
+//! side in a step. So one of them stands by awake during an iteration on a step's equations ([`with_help`]); others have to be
+//! woken.
 //!
 //! A caller inside a pool of rayon's (`ThreadPool::install`) gets its threads; any other has one. What is done side by
 //! side is cut by what there is to do, never by the number of threads, and every sum has one order, so that the bits do
@@ -13,8 +14,6 @@ use std::sync::atomic::{AtomicBool, Ordering};
 pub(crate) const MANY: usize = 3000;
 /// Items are shared from so many times on what is done at a time.
 pub(crate) const WORTH_HALVING: usize = 3;
-/// Most threads that stand by.
-const HELPERS: usize = 3;
 /// Looks for something to do before others are given way to.
 const PATIENCE: u32 = 64;
 
@@ -70,7 +69,11 @@ pub(crate) fn over<T: Send>(
     }
 }
 
-/// Does some work while other threads of the pool stand by awake to take a share of it.
+/// Does some work while another thread of the pool stands by awake to take a share of it.
+///
+/// One, because what stands by is the oldest that the worker offers, so that no thread comes to it from within a part of the work. A second
+/// one might be offered later, by the first: a thread that waits within a part of the work for another part would take it up and wait for the
+/// end of work that waits for it.
 pub(crate) fn with_help<T: Send>(pays: bool, work: impl FnOnce() -> T + Send) -> T {
     if !pays || !are_many() {
         return work();
@@ -79,22 +82,21 @@ pub(crate) fn with_help<T: Send>(pays: bool, work: impl FnOnce() -> T + Send) ->
         worker: rayon::current_thread_index(),
         is_over: AtomicBool::new(false),
     };
-    let helpers = HELPERS.min(rayon::current_num_threads() - 1);
     let work = || {
         let _release = Release(&team);
         work()
     };
-    rayon::join(work, || team.stand_by(helpers)).0
+    rayon::join(work, || team.help()).0
 }
 
-/// Threads that stand by.
+/// Who works, and who stands by.
 struct Team {
     /// The thread that works.
     worker: Option<usize>,
     is_over: AtomicBool,
 }
 
-/// Lets the helpers go, whatever happens.
+/// Lets the helper go, whatever happens.
 struct Release<'a>(&'a Team);
 
 impl Drop for Release<'_> {
@@ -104,14 +106,6 @@ impl Drop for Release<'_> {
 }
 
 impl Team {
-    fn stand_by(&self, helpers: usize) {
-        if helpers > 1 {
-            rayon::join(|| self.help(), || self.stand_by(helpers - 1));
-        } else {
-            self.help();
-        }
-    }
-
     /// Does what there is to do in the pool until the work is over.
     fn help(&self) {
         // The worker, while it waits for a helper, may come to this itself, and would wait for its own end.

@@ -383,7 +383,8 @@ fn a_suite_parts_the_errors_of_a_joined_column() {
     ] {
         assert!(deposit(part) > 1e-6 && deposit(part) < 0.06, "{part}");
     }
-    assert_eq!(figures("uncoupled"), [1.0]);
+    assert_eq!(figures("control"), [1.0]);
+    assert!(deposit("uncoupled") > 2.0 * deposit("hybrid"));
     let report = std::fs::read_to_string(folder.path().join("suite/report.html")).unwrap();
     assert!(report.contains("other packing") && report.contains("nothing exchanged"));
 }

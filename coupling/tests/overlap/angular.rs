@@ -125,7 +125,7 @@ fn a_material_edge_keeps_that_about_its_slab() {
     let moves = joined.edge().moves().len();
     println!("{moves} moves");
     assert!(moves > 0);
-    let entries = ["weight", "traction", "relaxation", "handed"];
+    let entries = ["weight", "traction", "relaxation", "moments", "handed"];
     closes(
         joined.zone.angular_book().unwrap(),
         &joined.simulation,

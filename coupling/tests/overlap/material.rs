@@ -436,9 +436,7 @@ fn spins(
     sums.map(|[n, spin, square]| [spin / n, (square / n).sqrt()])
 }
 
-/// Spins are not coupled at a material edge. The shell, which has no grains behind it, spins three times as fast as in grains
-/// alone, and the rest of the buffer by a third faster; the inner overlap and what lies beyond do not know of it (rms within 1
-/// and 4 %).
+/// The shell has no grains behind it. The inner overlap and what lies beyond do not know of it.
 #[test]
 fn spins_near_the_edge_beside_grains_alone() {
     let (until, from) = (7.0, 2.0);

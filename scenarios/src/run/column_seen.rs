@@ -71,7 +71,7 @@ impl SeenColumn {
             return Ok(());
         }
         let specs = JoinedColumn::new(scene, "").specs(self.course.solid_fraction)?;
-        // Of two edges the one on the wall's side is looked at.
+        // Of two edges the one on the wall's side is looked at, of one that one.
         let Some(&spec) = specs.first() else {
             return Ok(());
         };

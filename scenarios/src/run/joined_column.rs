@@ -375,7 +375,6 @@ impl Recipe for JoinedColumn<'_> {
         let mut own = self.scene.left_out();
         own.extend([
             "granular temperature and dilatancy of the continuum",
-            "spins across the edge",
             "exchange of mass through the edge but by whole strips (it moves with the material)",
         ]);
         own

@@ -10,10 +10,11 @@
 //!   ([`Outside`]); beyond ξ_m it is a copy of the grains, made anew at every exchange (`copy.rs`);
 //! - *on the grains*: the shell bears the continuum's traction σ n A, face by face of the box, with an impedance in
 //!   its normal part, −Z A (s·n) n, s the mean of v − u over the shell's grains, u at each one's place;
-//! - *on both, equal and opposite*: mean velocities of the buffer relax to each other.
+//! - *on both, equal and opposite*: mean velocities of the buffer relax to each other, mean spins to half of the curl, for which
+//!   the continuum has forces about the cell.
 //!
 //! The continuum is what is missing of the bed's mass, at the solid fraction of its grains, with a level surface.
-//! Spins are not coupled. One grain may belong to neither side: the ball.
+//! One grain may belong to neither side: the ball.
 
 mod account;
 mod cells;

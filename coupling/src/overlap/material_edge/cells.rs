@@ -96,6 +96,10 @@ pub struct Cover {
     pub buffer: f64,
     /// See `buffer` (N s).
     pub buffer_slip: [f64; 2],
+    /// Σ I h over them, I = 2 m r²/5 (kg m²), and Σ I ω h about y (N m s).
+    pub turning: f64,
+    /// See `turning`.
+    pub spin: f64,
     /// The same of the inner overlap.
     pub inner: f64,
     /// The same of the inner overlap (N s).

@@ -58,25 +58,38 @@ impl View {
 
     /// Takes the shear of a time (s) into what is remembered: differences of velocities between full cells.
     pub fn shear(&mut self, cells: &Cells, dt: f64) {
-        let [columns, rows] = cells.counts;
         for cell in (0..cells.count()).filter(|cell| self.fraction[*cell] > FULL) {
-            let (i, k) = (cell % columns, cell / columns);
-            let slope = |index: usize, count: usize, step: usize| {
-                let full = |is_there: bool, to: usize| match is_there && self.is_full(to) {
-                    true => to,
-                    false => cell,
-                };
-                let low = full(index > 0, cell.wrapping_sub(step));
-                let high = full(index + 1 < count, cell + step);
-                let steps = ((high - low) / step).max(1) as f64;
-                let change = |axis: usize| self.velocity[high][axis] - self.velocity[low][axis];
-                [0, 1].map(|axis| change(axis) / (steps * cells.spacing))
-            };
-            let ([ux, wx], [uz, wz]) = (slope(i, columns, 1), slope(k, rows, columns));
+            let [[ux, wx], [uz, wz]] = self.gradient(cells, cell);
             let strain = &mut self.rest.strain[cell];
             strain[0] += (ux - wz) * dt;
             strain[1] += (uz + wx) * dt;
         }
+    }
+
+    /// ∂(u, w)/∂x and ∂(u, w)/∂z of a cell (1/s), from differences between the full cells beside it.
+    fn gradient(&self, cells: &Cells, cell: usize) -> [[f64; 2]; 2] {
+        let [columns, rows] = cells.counts;
+        let slope = |index: usize, count: usize, step: usize| {
+            let full = |is_there: bool, to: usize| match is_there && self.is_full(to) {
+                true => to,
+                false => cell,
+            };
+            let low = full(index > 0, cell.wrapping_sub(step));
+            let high = full(index + 1 < count, cell + step);
+            let steps = ((high - low) / step).max(1) as f64;
+            let change = |axis: usize| self.velocity[high][axis] - self.velocity[low][axis];
+            [0, 1].map(|axis| change(axis) / (steps * cells.spacing))
+        };
+        [
+            slope(cell % columns, columns, 1),
+            slope(cell / columns, rows, columns),
+        ]
+    }
+
+    /// Rotation rate of the material about y, (∂u/∂z − ∂w/∂x)/2 (1/s).
+    pub fn rotation(&self, cells: &Cells, cell: usize) -> f64 {
+        let [[_, wx], [uz, _]] = self.gradient(cells, cell);
+        0.5 * (uz - wx)
     }
 
     /// Velocity at a place from the full cells around it; none without any.

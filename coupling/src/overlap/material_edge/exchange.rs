@@ -26,6 +26,11 @@ pub struct Scratch {
     forces: Vec<[f64; 2]>,
 }
 
+/// Moment of inertia of a ball (kg m²).
+fn inertia(grain: &GrainSample) -> f64 {
+    0.4 * grain.mass * grain.radius * grain.radius
+}
+
 /// A vector of the plane x–z in space.
 fn in_slab([x, z]: [f64; 2]) -> Vector3<f64> {
     Vector3::new(x, 0.0, z)
@@ -57,6 +62,9 @@ impl MaterialEdge {
             for (sum, force) in sum.iter_mut().zip(force) {
                 *sum += force * time;
             }
+        }
+        for (sum, moment) in self.given.spin.iter_mut().zip(&self.laid.spin) {
+            *sum += moment * time;
         }
         for (work, power) in self.monitors.work.iter_mut().zip(self.laid.powers) {
             *work += power * time;
@@ -165,8 +173,13 @@ impl MaterialEdge {
             let traction = force;
             let carried = embedded.force(grain, &gravity, stopping);
             let relaxed = if *label < buffer { grain.mass } else { 0.0 };
+            let turned = if *label < buffer { inertia(grain) } else { 0.0 };
+            let mut moment = 0.0;
             relaxation += carried.y * grain.velocity.y;
             for (cell, hat) in self.cells.hats(grain.position.x, grain.position.z) {
+                let turn = hat * turned * self.held.spins[cell];
+                self.laid.spin[cell] += turn;
+                moment += turn;
                 let laid = &mut self.laid.relaxation[cell];
                 for axis in 0..2 {
                     let relaxed = relaxed * self.held.accelerations[cell][axis];
@@ -176,19 +189,21 @@ impl MaterialEdge {
                     relaxation += pull * [grain.velocity.x, grain.velocity.z][axis];
                 }
             }
-            if force != [0.0; 2] || carried.y != 0.0 {
+            relaxation += moment * grain.spin.y;
+            if force != [0.0; 2] || carried.y != 0.0 || moment != 0.0 {
+                let moment = side.turned_about(Vector3::y() * moment);
                 let all = side.turned([force[0], carried.y, force[1]].into());
                 loads.push(Laid {
                     grain: grain.id,
                     force: all,
-                    moment: [0.0; 3].into(),
+                    moment,
                 });
                 if let Some(book) = &mut angular {
                     let traction = in_slab(side.in_plane(traction));
                     let parts = Parts {
                         traction,
                         relaxation: all - traction,
-                        ..Parts::default()
+                        moment,
                     };
                     book.lay(grain.id, parts);
                 }
@@ -210,6 +225,25 @@ impl MaterialEdge {
         self.scratch = scratch;
     }
 
+    /// The continuum has no spin: it takes the opposite of the couples that turned the grains of a cell as forces on the four
+    /// cells around it, of its moment and of no sum. At the ends of the grid there is nothing to take them.
+    pub(super) fn answer_couples(&mut self) {
+        let [columns, rows] = self.cells.counts;
+        let arm = 4.0 * self.cells.spacing;
+        for (cell, given) in self.given.spin.iter().enumerate() {
+            let (i, k) = (cell % columns, cell / columns);
+            let is_inside = i > 0 && i + 1 < columns && k > 0 && k + 1 < rows;
+            if *given == 0.0 || !is_inside {
+                continue;
+            }
+            let force = -given / arm;
+            self.owed[cell + columns][0] += force;
+            self.owed[cell - columns][0] -= force;
+            self.owed[cell + 1][1] -= force;
+            self.owed[cell - 1][1] += force;
+        }
+    }
+
     /// Averages of the grains to the continuum, its step, and what it does to the grains until the next exchange.
     fn exchange(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
         let dt = self.exchange_time();
@@ -220,6 +254,7 @@ impl MaterialEdge {
                 *owed -= given;
             }
         }
+        self.answer_couples();
         self.watch_impulses();
         for axis in 0..2 {
             self.account.traction[axis] += self.given.traction[axis];
@@ -339,6 +374,7 @@ impl MaterialEdge {
         let [handshake, inner] = self.spec.zones();
         for cover in &mut self.sums.cover {
             (cover.buffer, cover.buffer_slip) = (0.0, [0.0; 2]);
+            (cover.turning, cover.spin) = (0.0, 0.0);
             (cover.inner, cover.inner_slip) = (0.0, [0.0; 2]);
         }
         for grain in &self.sighting.snapshot.grains {
@@ -361,16 +397,23 @@ impl MaterialEdge {
                 for (sum, slip) in slips.iter_mut().zip(slip) {
                     *sum += mass * slip;
                 }
+                if label < handshake {
+                    let turning = inertia(grain) * hat;
+                    cover.turning += turning;
+                    cover.spin += turning * grain.spin.y;
+                }
             }
         }
     }
 
-    /// Takes the continuum's traction, forms the accelerations that bring mean velocities together, and finds the
-    /// edge and the handshake surface.
+    /// Takes the continuum's traction, forms the accelerations that bring mean velocities together, and mean spins to the rotation rate of the
+    /// material, and finds the edge and the handshake surface.
     pub(super) fn agree(&mut self) {
         self.slips();
         let dt = self.exchange_time();
-        let rate = (dt / self.spec.settings.relaxation_time).min(1.0) / dt;
+        let towards = |time: f64| (dt / time).min(1.0) / dt;
+        let rate = towards(self.spec.settings.relaxation_time);
+        let turn = towards(self.spec.settings.spin_time);
         let full = self.full();
         for cell in 0..self.cells.count() {
             let cover = &self.sums.cover[cell];
@@ -378,6 +421,12 @@ impl MaterialEdge {
             self.held.accelerations[cell] = match holds {
                 true => cover.buffer_slip.map(|slip| rate * slip / cover.buffer),
                 false => [0.0; 2],
+            };
+            self.held.spins[cell] = match holds {
+                true => {
+                    turn * (self.view.rotation(&self.cells, cell) - over(cover.spin, cover.turning))
+                }
+                false => 0.0,
             };
         }
         self.find_edge();

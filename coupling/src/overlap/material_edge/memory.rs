@@ -10,13 +10,13 @@ use super::{MaterialEdge, MaterialEdgeSpec, OverlapError, continuum};
 use colluvium_continuum::strain::SPACE_COMPONENTS;
 use colluvium_dem::{Patch, Simulation};
 
-/// Numbers in front but for the two rows of forces by cell, the account among them.
+/// Numbers in front but for the rows of forces and moments by cell, the account among them.
 const FRONT: usize = 17 + account::NUMBERS;
 
 impl MaterialEdge {
     /// What every load changes.
     fn front(&self) -> Vec<f64> {
-        let mut front = Vec::with_capacity(FRONT + 4 * self.cells.count());
+        let mut front = Vec::with_capacity(FRONT + 6 * self.cells.count());
         let cells = self.cells.count() as f64;
         front.extend([cells, self.made as f64, self.laid_at as f64]);
         for given in [&self.laid, &self.given] {
@@ -28,6 +28,8 @@ impl MaterialEdge {
         front.extend(self.account.numbers());
         front.extend(self.laid.relaxation.as_flattened());
         front.extend(self.given.relaxation.as_flattened());
+        front.extend(&self.laid.spin);
+        front.extend(&self.given.spin);
         front
     }
 
@@ -69,6 +71,7 @@ impl MaterialEdge {
         }
         put(self.sums.stress.as_flattened());
         put(self.held.accelerations.as_flattened());
+        put(&self.held.spins);
         let rows: Vec<f64> = self.held.rows.iter().flat_map(Row::numbers).collect();
         put(&rows);
         put(&self.held.handshake);
@@ -98,7 +101,7 @@ impl MaterialEdge {
         simulation: &Simulation,
     ) -> Result<Option<Self>, OverlapError> {
         let cells = memory.first().map_or(0, |cells| *cells as usize);
-        let front = FRONT + 4 * cells;
+        let front = FRONT + 6 * cells;
         let Some((front, mut rest)) = memory.split_at_checked(front) else {
             return Ok(None);
         };
@@ -144,8 +147,8 @@ impl MaterialEdge {
             refused,
             displaced,
         };
-        let Some([stress, accelerations, edge_rows, handshake, owed]) =
-            (|| Some([take()?, take()?, take()?, take()?, take()?]))()
+        let Some([stress, accelerations, spins, edge_rows, handshake, owed]) =
+            (|| Some([take()?, take()?, take()?, take()?, take()?, take()?]))()
         else {
             return Ok(None);
         };
@@ -157,6 +160,7 @@ impl MaterialEdge {
         };
         let fits = stress.len() == 3 * cells
             && accelerations.len() == 2 * cells
+            && spins.len() == cells
             && owed.len() == 2 * cells
             && strain.len() == SPACE_COMPONENTS * cells
             && edge_rows.len() == rows::NUMBERS * handshake.len()
@@ -171,6 +175,7 @@ impl MaterialEdge {
         }
         edge.sums.stress = stress.as_chunks::<3>().0.to_vec();
         edge.held.accelerations = accelerations.as_chunks::<2>().0.to_vec();
+        edge.held.spins = spins.to_vec();
         let numbers = edge_rows.as_chunks::<{ rows::NUMBERS }>().0;
         edge.held.rows = numbers.iter().map(Row::of).collect();
         edge.held.handshake = handshake.to_vec();
@@ -187,6 +192,7 @@ impl MaterialEdge {
             given.impedance = [n[2], n[3]];
             let own = &forces[2 * cells * k..2 * cells * (k + 1)];
             given.relaxation = own.as_chunks::<2>().0.to_vec();
+            given.spin = forces[cells * (4 + k)..cells * (5 + k)].to_vec();
         }
         edge.laid.powers = [scalars[14], scalars[15], scalars[16]];
         edge.account = Account::of(account);

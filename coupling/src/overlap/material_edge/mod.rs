@@ -14,13 +14,12 @@
 //!   ([`Outside`]); beyond ξ_m it is a copy of the grains, made anew at every exchange (`copy.rs`);
 //! - *on the grains*: the shell bears the continuum's traction row by row, with an impedance in its normal part
 //!   (`rows.rs`);
-//! - *on both, equal and opposite*: mean velocities of the buffer relax to each other, along x and z; and grains that have
-//!   come out of the edge are carried by the continuum that they lie in (`embedded.rs`).
+//! - *on both, equal and opposite*: mean velocities of the buffer relax to each other, along x and z, mean spins to
+//!   half of the curl, for which the continuum has forces about the cell; and grains that have come out of the edge are carried by the continuum that they lie in (`embedded.rs`).
 //!
 //! Grains that have left their neighbours get labels anew (`labels.rs`).
 //!
-//! The continuum is what is missing of the column's mass, at the solid fraction of its grains. Spins are not
-//! coupled. The continuum remembers how its grains pressed sideways at rest (`rest_stress.rs`), without which it pushes those of the
+//! The continuum is what is missing of the column's mass, at the solid fraction of its grains. The continuum remembers how its grains pressed sideways at rest (`rest_stress.rs`), without which it pushes those of the
 //! overlap by 30 to 50 % too much; `witness.rs` is the force that they bear without a joint. What lies far behind the edge and never moves need not be computed: the continuum may begin at a smooth
 //! wall x = x_w, behind which material *rests* as it stood.
 
@@ -131,6 +130,8 @@ impl MaterialEdgeSpec {
 struct Held {
     /// Accelerations of mean velocities of the buffer, cell by cell (m/s²).
     accelerations: Vec<[f64; 2]>,
+    /// Angular accelerations of their mean spins about y (rad/s²).
+    spins: Vec<f64>,
     rows: Vec<Row>,
     /// No grain of the buffer lies farther than this (m).
     reach: f64,
@@ -142,6 +143,8 @@ struct Held {
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Given {
     relaxation: Vec<[f64; 2]>,
+    /// Moments of the relaxation of spins about y, by cell (N m, or N m s).
+    spin: Vec<f64>,
     traction: [f64; 2],
     impedance: [f64; 2],
     /// Powers of traction, impedance and relaxation when they were laid (W); of what is laid alone.
@@ -152,12 +155,14 @@ impl Given {
     fn nothing(cells: usize) -> Self {
         Self {
             relaxation: vec![[0.0; 2]; cells],
+            spin: vec![0.0; cells],
             ..Self::default()
         }
     }
 
     fn clear(&mut self) {
         self.relaxation.fill([0.0; 2]);
+        self.spin.fill(0.0);
         (self.traction, self.impedance, self.powers) = ([0.0; 2], [0.0; 2], [0.0; 3]);
     }
 }
@@ -299,6 +304,7 @@ impl MaterialEdge {
             },
             held: Held {
                 accelerations: vec![[0.0; 2]; cells.count()],
+                spins: vec![0.0; cells.count()],
                 rows: vec![Row::default(); cells.counts[1]],
                 reach: 0.0,
                 handshake: vec![spec.place + spec.settings.buffer; cells.counts[1]],

@@ -12,14 +12,17 @@ const WIDTH: f64 = 4.0;
 const EDGE: f64 = 8.0;
 
 /// A column of grains on a cubic lattice with every other layer of x shifted up, which no mean of rows is symmetric to.
-fn grains() -> Vec<Grain> {
+fn grains(spin: Vector3<f64>) -> Vec<Grain> {
     let place = |n: usize| {
         let (i, j, k) = (n / 40, n / 10 % 4, n % 10);
         let shift = 0.07 * (i % 3) as f64;
         Vector3::new(i as f64 + 0.5, j as f64 + 0.5, k as f64 + 0.45 + shift)
     };
     let count = LENGTH as usize * 40;
-    let ball = |n| Grain::at_rest(place(n), 0.45 + 0.01 * (n % 5) as f64, 1.9);
+    let ball = |n| Grain {
+        spin,
+        ..Grain::at_rest(place(n), 0.45 + 0.01 * (n % 5) as f64, 1.9)
+    };
     (0..count).map(ball).collect()
 }
 
@@ -37,7 +40,7 @@ fn joined(rate: f64, drift: [f64; 2], ours: f64) -> (MaterialEdge, Simulation) {
         },
         gravity: -Vector3::z(),
         law: law.into(),
-        grains: grains(),
+        grains: grains(-ours * Vector3::y()),
         walls: vec![Wall::plane(Vector3::zeros(), Vector3::z())],
         bodies: Vec::new(),
         timestep: 1e-3,
@@ -108,15 +111,19 @@ fn joined(rate: f64, drift: [f64; 2], ours: f64) -> (MaterialEdge, Simulation) {
     (edge, simulation)
 }
 
-/// Largest acceleration of the relaxation, and force of the impedance, of rows away from floor and surface, where velocities
+/// Largest acceleration of the relaxation, angular acceleration of spins, and force of the impedance, of rows away from floor and surface, where velocities
 /// are interpolated from both sides.
-fn exchanged(edge: &MaterialEdge) -> [f64; 2] {
+fn exchanged(edge: &MaterialEdge) -> [f64; 3] {
     let columns = edge.cells.counts[0];
     let inside = 2..(HEIGHT as usize - 3);
     let accelerations = inside
         .clone()
         .flat_map(|k| &edge.held.accelerations[k * columns..(k + 1) * columns]);
     let accelerations = accelerations.flatten().map(|a| a.abs());
+    let spins = inside
+        .clone()
+        .flat_map(|k| &edge.held.spins[k * columns..(k + 1) * columns]);
+    let spins = spins.map(|a| a.abs()).fold(0.0, f64::max);
     let forces = inside.map(|k| {
         let load = &edge.scratch.shell[k];
         let slip = load.slip.map(|p| cells::over(p, load.weight));
@@ -125,6 +132,7 @@ fn exchanged(edge: &MaterialEdge) -> [f64; 2] {
     });
     [
         accelerations.fold(0.0, f64::max),
+        spins,
         forces.fold(0.0, f64::max),
     ]
 }
@@ -138,9 +146,9 @@ fn what_moves_and_turns_as_one_exchanges_nothing() {
         (-0.3, [0.2, 0.1]),
     ] {
         let (edge, _) = joined(rate, drift, rate);
-        let [acceleration, force] = exchanged(&edge);
-        println!("{rate} {drift:?}: {acceleration:.1e} {force:.1e}");
-        assert!(acceleration < 1e-13 && force < 1e-10);
+        let [acceleration, spin, force] = exchanged(&edge);
+        println!("{rate} {drift:?}: {acceleration:.1e} {spin:.1e} {force:.1e}");
+        assert!(acceleration < 1e-13 && spin < 1e-13 && force < 1e-10);
     }
 }
 
@@ -148,9 +156,34 @@ fn what_moves_and_turns_as_one_exchanges_nothing() {
 #[test]
 fn what_turns_at_another_rate_does() {
     let (edge, _) = joined(0.2, [0.0; 2], 0.22);
-    let [acceleration, force] = exchanged(&edge);
+    let [acceleration, spin, force] = exchanged(&edge);
     assert!(
-        acceleration > 1e-3 && force > 1.0,
-        "{acceleration:e} {force:e}"
+        acceleration > 1e-3 && spin > 1e-3 && force > 1.0,
+        "{acceleration:e} {spin:e} {force:e}"
     );
+}
+
+/// The continuum takes a couple as forces that move nothing and turn as much the other way.
+#[test]
+fn a_couple_is_answered_by_forces_of_its_moment() {
+    let (mut edge, _) = joined(0.0, [0.0; 2], 0.0);
+    let columns = edge.cells.counts[0];
+    edge.owed.fill([0.0; 2]);
+    edge.given.spin.fill(0.0);
+    edge.given.spin[7 + 4 * columns] = 0.3;
+    // On the floor there is nothing to take one.
+    edge.given.spin[7] = 0.3;
+    edge.answer_couples();
+    let (mut force, mut moment) = ([0.0; 2], 0.0);
+    for (cell, owed) in edge.owed.iter().enumerate() {
+        let at = [
+            edge.cells.centre(cell % columns),
+            edge.cells.height(cell / columns),
+        ];
+        // y of x × F.
+        moment += at[1] * owed[0] - at[0] * owed[1];
+        force = [0, 1].map(|axis| force[axis] + owed[axis]);
+    }
+    assert!(force.iter().all(|f: &f64| f.abs() < 1e-15), "{force:?}");
+    assert!((moment + 0.3).abs() < 1e-14, "{moment}");
 }

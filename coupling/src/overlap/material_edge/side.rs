@@ -37,7 +37,7 @@ impl Side {
     }
 
     /// An axial vector, of turning or of a moment, on the edge's own axes; and back.
-    fn turned_about(self, v: Vector3<f64>) -> Vector3<f64> {
+    pub fn turned_about(self, v: Vector3<f64>) -> Vector3<f64> {
         Vector3::new(v.x, self.along(v.y), self.along(v.z))
     }
 

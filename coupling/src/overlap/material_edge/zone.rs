@@ -158,6 +158,7 @@ impl GrainZone {
                 let same = next.grain == load.grain;
                 if same {
                     load.force += next.force;
+                    load.moment += next.moment;
                 }
                 same
             });
@@ -398,9 +399,19 @@ fn check(specs: &[MaterialEdgeSpec]) -> Result<(), OverlapError> {
         [_] => Ok(()),
         [below, above] if below.side == Side::Below && above.side == Side::Above => {
             let apart = above.side.along(above.place) - below.place;
-            match apart >= below.zones()[1] + above.zones()[1] {
+            if below.settings.exchange_time != above.settings.exchange_time
+                || below.settings.load_time != above.settings.load_time
+            {
+                let time = above.settings.exchange_time;
+                return refuse(
+                    "exchange_time",
+                    time,
+                    "that of the other edge, as load_time",
+                );
+            }
+            match apart > below.zones()[1] + above.zones()[1] {
                 true => Ok(()),
-                false => refuse("zone", apart, "at least the widths of both overlaps"),
+                false => refuse("zone", apart, "more than the widths of both overlaps"),
             }
         }
         [_, _] => refuse(

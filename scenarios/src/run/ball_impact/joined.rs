@@ -256,7 +256,6 @@ impl Recipe for JoinedBed<'_> {
         let mut own = self.scene.left_out();
         own.extend([
             "granular temperature, dilatancy and compaction of the continuum",
-            "spins across the box",
             match self.scene.zones.moving {
                 true => "exchange of mass through the box but by whole strips",
                 false => "exchange of mass through the box (it stays, and little moves there)",
