@@ -38,7 +38,13 @@ fn a_joined_cliff_falls_as_its_grains_do() {
     succeed(folder.path(), &arguments("joined", &joined));
     succeed(folder.path(), &arguments("control", &control));
     let all = ["grains", "joined", "control"].map(|name| summary(&at(name)));
-    for name in ["x_front", "runout_scaled", "deposit_height", "time_of_rest"] {
+    for name in [
+        "x_front",
+        "x_of_share",
+        "runout_scaled",
+        "deposit_height",
+        "time_of_rest",
+    ] {
         println!("{name}: {:?}", all.each_ref().map(|s| value(s, name)));
     }
     let [grains, joined, control] = &all;
@@ -70,8 +76,10 @@ fn a_joined_cliff_falls_as_its_grains_do() {
     let (joint, without) = (apart("joined"), apart("control"));
     println!("deposits apart: joined {joint:.4}, nothing exchanged {without:.4}");
     assert!(joint < 0.06 && without > 0.08, "{joint} {without}");
-    let runout = value(joined, "runout_scaled") / value(grains, "runout_scaled") - 1.0;
-    assert!(runout.abs() < 0.15, "{runout}");
+    // The front at the threshold is a matter of single grains (-16 % of the run-out); where 99 % of the area end is not.
+    let [front, share] =
+        ["runout_scaled", "x_of_share"].map(|name| value(joined, name) / value(grains, name) - 1.0);
+    assert!(front.abs() < 0.25 && share.abs() < 0.05, "{front} {share}");
     assert!(value(control, "grains_escaped") > 10.0);
     pictures(&at("joined"));
 }
