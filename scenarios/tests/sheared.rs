@@ -153,7 +153,7 @@ fn what_has_no_steady_or_no_definite_flow_is_refused() {
         (
             "plane-shear",
             &["slope_degrees=3"],
-            ["slope_degrees", "plane-shear", ""],
+            ["slope_degrees", "wall_velocity", ""],
         ),
     ] {
         let mut arguments = vec!["run", scene, "--out", "bad"];
