@@ -1,0 +1,475 @@
+//! Open ends in space: plane flow against the plane solver, Bagnold flow against its exact profile, inflow that varies
+//! across, sliding side walls, a heap that leaves, restarts and threads.
+use colluvium_continuum::free_surface::{
+    Inflow, SpaceFlow, SpaceState, SurfaceFlow, SurfaceOptions,
+};
+use colluvium_continuum::grid::{Axis, Boundary, Grid};
+use colluvium_continuum::rheology::MuI;
+use colluvium_continuum::wall_friction::WallFriction;
+use rayon::ThreadPoolBuilder;
+
+const SLOPE: f64 = 0.43;
+const DIAMETER: f64 = 0.04;
+const SMOOTH: Boundary = Boundary::FreeSlip;
+const ROUGH: Boundary = Boundary::NoSlip { velocity: 0.0 };
+
+/// Steady Bagnold flow one deep, at a height.
+fn bagnold(z: f64) -> f64 {
+    let number = 0.4 * (SLOPE.tan() - 0.32) / (0.60 - SLOPE.tan());
+    let scale = (2.0 / 3.0) * (number / DIAMETER) * SLOPE.cos().sqrt();
+    scale * (1.0 - (1.0 - z.clamp(0.0, 1.0)).powf(1.5))
+}
+
+fn grains() -> MuI {
+    MuI::new(0.32, 0.60, 0.4, DIAMETER, 1.0, 1.0)
+}
+
+fn bounded(h: f64, cells: usize, low: Boundary, high: Boundary) -> Axis {
+    Axis::Bounded {
+        length: h * cells as f64,
+        cells,
+        low,
+        high,
+    }
+}
+
+/// A layer one deep of so many cells and a bit, in a chute of so many columns that is `rows` high.
+#[derive(Clone, Copy)]
+struct Chute {
+    cells: usize,
+    columns: usize,
+    rows: usize,
+    options: SurfaceOptions,
+}
+
+impl Chute {
+    fn new(cells: usize) -> Self {
+        Self {
+            cells,
+            columns: 2 * cells,
+            rows: cells + 4,
+            options: SurfaceOptions::default(),
+        }
+    }
+
+    /// Equations solved far beyond what a flow needs.
+    fn exact(mut self) -> Self {
+        let solver = &mut self.options.solver;
+        solver.momentum_tolerance = 1e-9;
+        solver.divergence_tolerance = 1e-10;
+        solver.stress_tolerance = 1e-9;
+        solver.tolerance_in_motion = 1.0;
+        solver.linear_tolerance = 1e-9;
+        self
+    }
+
+    fn h(&self) -> f64 {
+        1.0 / (self.cells as f64 + 0.3)
+    }
+
+    fn filled(&self, row: usize) -> f64 {
+        (1.0 / self.h() - row as f64).clamp(0.0, 1.0)
+    }
+
+    fn speed(&self, row: usize) -> f64 {
+        bagnold((row as f64 + 0.5) * self.h())
+    }
+
+    fn along(&self) -> Axis {
+        bounded(self.h(), self.columns, SMOOTH, SMOOTH)
+    }
+
+    fn upwards(&self) -> Axis {
+        bounded(self.h(), self.rows, ROUGH, SMOOTH)
+    }
+
+    /// What enters: Bagnold flow times a factor in each strip.
+    fn inflow(&self, factors: &[f64]) -> Inflow {
+        let rows = (0..self.rows).flat_map(|row| factors.iter().map(move |f| (row, f)));
+        Inflow {
+            speeds: rows.clone().map(|(row, f)| f * self.speed(row)).collect(),
+            fractions: rows.map(|(row, _)| self.filled(row)).collect(),
+        }
+    }
+
+    /// Bagnold flow everywhere, fed with it times a factor.
+    fn in_plane(&self, factor: f64) -> SurfaceFlow<MuI> {
+        let grid = Grid::with_moving_surface([self.along(), self.upwards()]).unwrap();
+        let cells = (0..self.columns * self.rows).map(|c| self.filled(c / self.columns));
+        let gravity = [SLOPE.sin(), -SLOPE.cos()];
+        let mut flow = SurfaceFlow::at_rest(grid, cells.collect(), grains(), gravity, self.options)
+            .unwrap()
+            .with_open_ends(self.inflow(&[factor]))
+            .unwrap();
+        let mut state = flow.state().clone();
+        self.set_off(&mut state.velocity[0], 1);
+        flow.set_state(state).unwrap();
+        flow
+    }
+
+    /// The same in space, with a factor for each strip.
+    fn in_space(&self, across: Axis, factors: &[f64]) -> SpaceFlow<MuI> {
+        let grid = Grid::with_moving_surface([self.along(), across, self.upwards()]).unwrap();
+        let layer = self.columns * factors.len();
+        let cells = (0..layer * self.rows).map(|c| self.filled(c / layer));
+        let gravity = [SLOPE.sin(), 0.0, -SLOPE.cos()];
+        let mut flow = SpaceFlow::in_space(grid, cells.collect(), grains(), gravity, self.options)
+            .unwrap()
+            .with_open_ends(self.inflow(factors))
+            .unwrap();
+        let mut state = flow.state().clone();
+        self.set_off(&mut state.velocity[0], factors.len());
+        flow.set_state(state).unwrap();
+        flow
+    }
+
+    fn set_off(&self, u: &mut [f64], across: usize) {
+        let width = self.columns + 1;
+        for (face, u) in u.iter_mut().enumerate() {
+            if face % width > 0 {
+                *u = self.speed(face / width / across);
+            }
+        }
+    }
+
+    /// Relative L2 distance of the speeds along the chute from Bagnold's, in the cells that are full.
+    fn miss(&self, flow: &SpaceFlow<MuI>, across: usize) -> f64 {
+        let width = self.columns + 1;
+        let [mut miss, mut size] = [0.0; 2];
+        for (face, u) in flow.state().velocity[0].iter().enumerate() {
+            let row = face / width / across;
+            if row < self.cells {
+                miss += (u - self.speed(row)).powi(2);
+                size += self.speed(row).powi(2);
+            }
+        }
+        f64::sqrt(miss / size)
+    }
+}
+
+fn run_to(flow: &mut SpaceFlow<MuI>, end: f64) {
+    while flow.state().time < end - 1e-9 {
+        flow.step(end - flow.state().time).unwrap();
+    }
+}
+
+/// How far the volume is from what was there, came in and went out, over what came in and was there.
+fn volume_error(flow: &SpaceFlow<MuI>, before: f64) -> f64 {
+    let [entered, left] = flow.state().passed;
+    (flow.volume() - before - (entered - left)).abs() / (entered + before)
+}
+
+/// Largest difference of a field from its mirror image across y, of faces or cells in strips of so many.
+fn asymmetry(values: &[f64], width: usize, across: usize) -> f64 {
+    let layers = values.chunks_exact(width * across);
+    let pairs = layers.flat_map(|layer| {
+        let strips = layer.chunks_exact(width);
+        strips.clone().zip(strips.rev())
+    });
+    pairs
+        .flat_map(|(a, b)| a.iter().zip(b))
+        .fold(0.0, |most, (a, b)| most.max((a - b).abs()))
+}
+
+/// A chute that is fed with 0.7 of what it would keep, the same all across, in space: depths, speeds and what passed the ends
+/// are those of the plane. What differs is said in the assertions: where one component alone slides on material, on a
+/// flat axis, it is what the solver's tolerance leaves.
+#[test]
+fn plane_flow_through_open_ends_is_that_of_the_plane() {
+    let chute = Chute::new(6).exact();
+    let (h, end) = (chute.h(), 0.6);
+    let mut plane = chute.in_plane(0.7);
+    while plane.state().time < end - 1e-9 {
+        plane.step(end - plane.state().time).unwrap();
+    }
+    let depths = plane.heights();
+    let width = chute.columns + 1;
+    for (name, axis) in [
+        ("flat", Axis::Flat),
+        ("one cell", bounded(h, 1, SMOOTH, SMOOTH)),
+        ("two cells", bounded(h, 2, SMOOTH, SMOOTH)),
+        (
+            "periodic",
+            Axis::Periodic {
+                length: 0.3,
+                cells: 3,
+            },
+        ),
+    ] {
+        let across = axis.cells();
+        let mut flow = chute.in_space(axis, &vec![0.7; across]);
+        let before = flow.volume();
+        run_to(&mut flow, end);
+        let state = flow.state();
+        let strips = flow.heights();
+        let depth = strips.iter().enumerate().fold(0.0_f64, |most, (n, d)| {
+            most.max((d - depths[n % chute.columns]).abs())
+        });
+        let mut speed = 0.0_f64;
+        for (face, u) in state.velocity[0].iter().enumerate() {
+            let (row, column) = (face / width / across, face % width);
+            if row < chute.cells - 1 {
+                speed = speed.max((u - plane.state().velocity[0][row * width + column]).abs());
+            }
+        }
+        println!("{:.4?}\n{:.4?} {:?}", depths, strips, plane.state().passed);
+        let breadth = axis.cells() as f64 * axis.spacing();
+        let passed = [0, 1].map(|n| {
+            (state.passed[n] / breadth - plane.state().passed[n]).abs() / plane.state().passed[n]
+        });
+        let balance = volume_error(&flow, before);
+        println!(
+            "{name}: depth {depth:.1e}, speed {speed:.1e}, passed {passed:.1?}, volume {balance:.1e}, steps {} and {}",
+            state.steps,
+            plane.state().steps
+        );
+        assert!(balance < 1e-13, "{name}: {balance:e}");
+        assert!(passed[0] < 1e-12, "{name}: {passed:?}");
+        assert!(depth < 1e-5 && speed < 1e-4, "{name}: {depth:e} {speed:e}");
+    }
+    // Fed with all of it: negative control.
+    let mut other = chute.in_space(Axis::Flat, &[1.0]);
+    run_to(&mut other, end);
+    let apart = other.heights().into_iter().zip(&depths);
+    let apart = apart.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+    assert!(apart > 0.02, "{apart}");
+}
+
+/// Steady Bagnold flow passes through a chute with periodic or smooth sides; velocity and depth are off by less on finer cells.
+#[test]
+fn bagnold_flow_passes_through_in_space() {
+    let across = |chute: &Chute, periodic: bool| match periodic {
+        true => Axis::Periodic {
+            length: 3.0 * chute.h(),
+            cells: 3,
+        },
+        false => bounded(chute.h(), 2, SMOOTH, SMOOTH),
+    };
+    for periodic in [true, false] {
+        let [coarse, fine] = [6, 12].map(|cells| {
+            let mut chute = Chute::new(cells);
+            chute.columns = 12 * cells / 6;
+            let axis = across(&chute, periodic);
+            let strips = axis.cells();
+            let mut flow = chute.in_space(axis, &vec![1.0; strips]);
+            let before = flow.volume();
+            run_to(&mut flow, 1.0);
+            assert!(volume_error(&flow, before) < 1e-13);
+            let heights = flow.heights();
+            let depth = heights.iter().fold(0.0_f64, |m, d| m.max((d - 1.0).abs()));
+            let v = flow.state().velocity[1].iter();
+            let sideways = v.fold(0.0_f64, |most, v| most.max(v.abs()));
+            [chute.miss(&flow, strips), depth, sideways]
+        });
+        let order = [0, 1].map(|n| (coarse[n] / fine[n]).log2());
+        println!("periodic {periodic}: {coarse:?} on 6 cells, {fine:?} on 12, order {order:?}");
+    }
+}
+
+/// A chute whose side walls rub, and an inflow that is faster in the middle: both are their own mirror images, and become steady;
+/// beside rubbing walls the flow is slower and the layer deeper than with smooth ones.
+#[test]
+fn flow_that_varies_across_is_its_own_mirror_image() {
+    let mut chute = Chute::new(5);
+    chute.rows = 9;
+    let rubbing = Boundary::CoulombWall {
+        velocity: 0.0,
+        friction: WallFriction {
+            friction: 0.15,
+            cohesion: 0.0,
+        },
+    };
+    let peaked = [0.8, 1.1, 1.1, 0.8];
+    let even = [1.0; 4];
+    for (name, wall, factors) in [
+        ("rubbing walls", rubbing, even),
+        ("faster in the middle", SMOOTH, peaked),
+        ("smooth walls", SMOOTH, even),
+    ] {
+        let mut flow = chute.in_space(bounded(chute.h(), 4, wall, wall), &factors);
+        let before = flow.volume();
+        run_to(&mut flow, 2.5);
+        let earlier = flow.state().velocity[0].clone();
+        run_to(&mut flow, 3.0);
+        let state = flow.state();
+        let width = chute.columns + 1;
+        let skew = asymmetry(&state.fractions, chute.columns, 4).max(asymmetry(
+            &state.velocity[0],
+            width,
+            4,
+        ));
+        let change = earlier.iter().zip(&state.velocity[0]);
+        let change = change.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+        // Speeds near the surface beside the wall and inside, most of the way down.
+        let at = |strip: usize| {
+            let row = 3 * 4 + strip;
+            state.velocity[0][row * width + 3 * chute.columns / 4]
+        };
+        let balance = volume_error(&flow, before);
+        let heights = flow.heights();
+        println!(
+            "{name}: skew {skew:.1e}, change {change:.1e}, speeds {:.4} and {:.4} of {:.4}, depths {:.4} {:.4}, volume {balance:.1e}, steps {}",
+            at(0),
+            at(1),
+            chute.speed(3),
+            heights[chute.columns - 2],
+            heights[2 * chute.columns - 2],
+            state.steps
+        );
+    }
+}
+
+/// A heap in the middle of a chute that is closed above, beside a plane of symmetry; free at a distance of so many heights.
+fn heap(length: usize, open: bool) -> SpaceFlow<MuI> {
+    let (per, across, rows) = (6, 6, 8);
+    let h = 1.0 / per as f64;
+    let columns = length * per;
+    let axes = [
+        bounded(h, columns, SMOOTH, SMOOTH),
+        bounded(h, across, SMOOTH, SMOOTH),
+        bounded(h, rows, ROUGH, SMOOTH),
+    ];
+    let cells = (0..columns * across * rows).map(|cell| {
+        let (i, j, k) = (
+            cell % columns,
+            cell / columns % across,
+            cell / (columns * across),
+        );
+        f64::from(u8::from(i < per && j < across / 2 && k < per))
+    });
+    let flow = SpaceFlow::in_space(
+        Grid::with_moving_surface(axes).unwrap(),
+        cells.collect(),
+        grains(),
+        [SLOPE.sin(), 0.0, -SLOPE.cos()],
+        SurfaceOptions::default(),
+    )
+    .unwrap();
+    if open {
+        flow.with_open_outflow().unwrap()
+    } else {
+        flow
+    }
+}
+
+/// A heap runs down a chute and out of its open end, as if it went on beyond it; at a closed end it piles up.
+#[test]
+fn a_heap_leaves_through_the_open_end() {
+    let end = 3.5;
+    let lengths = [(2, true), (4, true), (2, false)];
+    let flows = lengths.map(|(length, open)| {
+        let mut flow = heap(length, open);
+        let before = flow.volume();
+        run_to(&mut flow, end);
+        println!(
+            "{length} {open}: volume {:.1e}, left {:.4} of {before:.4}, steps {}",
+            volume_error(&flow, before),
+            flow.state().passed[1],
+            flow.state().steps
+        );
+        flow
+    });
+    let [short, long, closed] = &flows;
+    let columns = 12;
+    let mean = |flow: &SpaceFlow<MuI>, column: usize| {
+        let width = flow.grid().axes()[0].cells();
+        flow.heights()
+            .chunks_exact(width)
+            .map(|s| s[column])
+            .sum::<f64>()
+            / 6.0
+    };
+    for column in 0..columns {
+        println!(
+            "{column}: {:.4} {:.4} {:.4}",
+            mean(short, column),
+            mean(long, column),
+            mean(closed, column)
+        );
+    }
+}
+
+/// A flow stopped in the middle goes on to the same bits, and so it does on two threads.
+#[test]
+fn restarts_and_threads_change_no_bit() {
+    let mut chute = Chute::new(6);
+    chute.columns = 18;
+    let across = bounded(chute.h(), 4, SMOOTH, SMOOTH);
+    let factors = [0.8, 1.1, 1.0, 0.9];
+    let end = 0.25;
+    let run = |threads: usize, stop: Option<f64>| -> SpaceState {
+        let pool = ThreadPoolBuilder::new()
+            .num_threads(threads)
+            .build()
+            .unwrap();
+        pool.install(|| {
+            let mut flow = chute.in_space(across, &factors);
+            while flow.state().time < end - 1e-9 {
+                flow.step(end - flow.state().time).unwrap();
+                if stop.is_some_and(|stop| flow.state().time >= stop) {
+                    let state = flow.state().clone();
+                    flow = chute.in_space(across, &factors);
+                    flow.set_state(state).unwrap();
+                }
+            }
+            flow.state().clone()
+        })
+    };
+    let whole = run(1, None);
+    println!("{} steps, {:?}", whole.steps, whole.passed);
+    assert!(whole.passed[1] > 0.0 && whole.steps > 10);
+    assert_eq!(whole, run(2, None));
+    assert_eq!(whole, run(1, Some(0.1)));
+}
+
+#[test]
+fn inflow_that_does_not_fit_a_grid_in_space_is_refused_by_name() {
+    let chute = Chute::new(4);
+    let across = bounded(chute.h(), 2, SMOOTH, SMOOTH);
+    let refused = |inflow: Inflow, low: Boundary| {
+        let axes = [
+            bounded(chute.h(), chute.columns, low, SMOOTH),
+            across,
+            chute.upwards(),
+        ];
+        let cells = vec![0.5; chute.columns * 2 * chute.rows];
+        let options = SurfaceOptions::default();
+        SpaceFlow::in_space(
+            Grid::with_moving_surface(axes).unwrap(),
+            cells,
+            grains(),
+            [0.0, 0.0, -1.0],
+            options,
+        )
+        .unwrap()
+        .with_open_ends(inflow)
+        .map(drop)
+        .unwrap_err()
+        .to_string()
+    };
+    let good = || chute.inflow(&[1.0, 1.0]);
+    let faces = 2 * chute.rows;
+    let mut backwards = good();
+    backwards.speeds[3] = -0.1;
+    let mut overfull = good();
+    overfull.fractions[0] = 1.5;
+    let mut dry = good();
+    dry.fractions.fill(0.0);
+    let mut still = good();
+    still.speeds.fill(0.0);
+    let mut unknown = good();
+    unknown.speeds[0] = f64::NAN;
+    let many = format!("{faces} faces");
+    for (inflow, low, key, range) in [
+        (chute.inflow(&[1.0]), SMOOTH, "inflow.speeds", many.as_str()),
+        (backwards, SMOOTH, "inflow.speeds", "0 to"),
+        (unknown, SMOOTH, "inflow.speeds", "0 to"),
+        (overfull, SMOOTH, "inflow.fractions", "0 to 1e0"),
+        (dry, SMOOTH, "inflow", "greater than 0"),
+        (still, SMOOTH, "inflow", "greater than 0"),
+        (good(), ROUGH, "inflow", "smooth walls"),
+    ] {
+        let error = refused(inflow, low);
+        assert!(error.contains(key) && error.contains(range), "{error}");
+    }
+}
