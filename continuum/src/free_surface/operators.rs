@@ -266,7 +266,11 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             if (0..D).any(|axis| self.slides(axis, at)) {
                 self.add_sliding(cell, index, side, [filled(), share], points, places);
             }
-            let layer = self.under_layer(cell, side, share, filled);
+            // On an open end nothing slides: what crosses it is given, or moves with the column before it.
+            let layer = match self.is_open(at[0]) {
+                true => None,
+                false => self.under_layer(cell, side, share, filled),
+            };
             let volume = match (&layer, self.wall_share(at)) {
                 (Some(layer), _) => layer.volume,
                 (None, Some(factor)) => factor * share,
@@ -339,8 +343,9 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 NONE => cell,
                 face => face,
             };
-            if let Some(j) = self.faces.role[component][face].unknown() {
-                point.add_velocity(j, component, 1.0);
+            match self.faces.role[component][face].unknown() {
+                Some(j) => point.add_velocity(j, component, 1.0),
+                None => point.add_known_rate(component, self.known_velocity(component, face)),
             }
         }
         if self.faces.pressure[cell] != NONE {
