@@ -202,7 +202,7 @@ fn apart(plane: &[f64], space: &[f64], width: usize, across: usize) -> f64 {
 /// whether the uppermost cells have a pressure: the operators at the ends.
 #[test]
 fn velocities_between_open_ends_are_those_of_the_plane() {
-    for (part, factor) in [(0.3, 1.0), (0.3, 0.8), (0.7, 1.3)] {
+    for (part, factor) in [(0.3, 1.0), (0.3, 1.2), (0.7, 1.3)] {
         let mut chute = Chute::new(6).exact();
         chute.part = part;
         let mut plane = chute.in_plane(factor);
@@ -269,7 +269,7 @@ fn bagnold_flow_passes_through_in_space() {
             let strips = axis.cells();
             let mut flow = chute.in_space(axis, &vec![1.0; strips]);
             let before = flow.volume();
-            run_to(&mut flow, 1.0);
+            run_to(&mut flow, 0.6);
             assert!(volume_error(&flow, before) < 1e-13);
             let heights = flow.heights();
             let depth = heights.iter().fold(0.0_f64, |m, d| m.max((d - 1.0).abs()));
@@ -286,12 +286,13 @@ fn bagnold_flow_passes_through_in_space() {
 /// beside rubbing walls the flow is slower and the layer deeper than with smooth ones.
 #[test]
 fn flow_that_varies_across_is_its_own_mirror_image() {
-    let mut chute = Chute::new(5);
-    chute.rows = 9;
+    let mut chute = Chute::new(5).exact();
+    chute.part = 0.2;
+    chute.rows = 8;
     let rubbing = Boundary::CoulombWall {
         velocity: 0.0,
         friction: WallFriction {
-            friction: 0.3,
+            friction: 0.2,
             cohesion: 0.0,
         },
     };
@@ -304,9 +305,9 @@ fn flow_that_varies_across_is_its_own_mirror_image() {
     ] {
         let mut flow = chute.in_space(bounded(chute.h(), 4, wall, wall), &factors);
         let before = flow.volume();
-        run_to(&mut flow, 2.5);
+        run_to(&mut flow, 1.0);
         let earlier = flow.state().velocity[0].clone();
-        run_to(&mut flow, 3.0);
+        run_to(&mut flow, 1.5);
         let state = flow.state();
         let width = chute.columns + 1;
         let skew = asymmetry(&state.fractions, chute.columns, 4).max(asymmetry(
@@ -332,6 +333,35 @@ fn flow_that_varies_across_is_its_own_mirror_image() {
             heights[2 * chute.columns - 2],
             state.steps
         );
+    }
+}
+
+#[test]
+fn debug_walls() {
+    let mut chute = Chute::new(5).exact();
+    chute.part = 0.2;
+    chute.rows = 8;
+    let h = chute.h();
+    let wall = WallFriction { friction: 0.2, cohesion: 0.0 };
+    for n in [0, 2, 4, 8] {
+        let (heights, speeds, strips) = if n == 0 {
+            let walls = colluvium_continuum::wall_friction::SideWalls { width: 4.0 * h, friction: wall };
+            let mut flow = chute.in_plane(1.0).between_side_walls(walls).unwrap();
+            while flow.state().time < 1.5 - 1e-9 {
+                flow.step(1.5 - flow.state().time).unwrap();
+            }
+            (flow.heights(), flow.state().velocity[0].clone(), 1)
+        } else {
+            let b = Boundary::CoulombWall { velocity: 0.0, friction: wall };
+            let axis = bounded(2.0 * h / n as f64 , n, b, SMOOTH);
+            let mut flow = chute.in_space(axis, &vec![1.0; n]);
+            run_to(&mut flow, 1.5);
+            (flow.heights(), flow.state().velocity[0].clone(), n)
+        };
+        let width = chute.columns + 1;
+        let mean = |column: usize| (0..strips).map(|s| heights[s * chute.columns + column]).sum::<f64>() / strips as f64;
+        let u = |row: usize, column: usize| (0..strips).map(|s| speeds[(row * strips + s) * width + column]).sum::<f64>() / strips as f64;
+        println!("{n}: depth {:.4} {:.4}, u {:.4} {:.4} {:.4} of {:.4} {:.4} {:.4}", mean(5), mean(9), u(0, 7), u(2, 7), u(4, 7), chute.speed(0), chute.speed(2), chute.speed(4));
     }
 }
 
