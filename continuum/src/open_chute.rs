@@ -8,7 +8,7 @@
 
 mod across;
 
-pub use across::{Across, Sides};
+pub use across::{Across, Sides, SpaceChute};
 
 use serde::{Deserialize, Serialize};
 

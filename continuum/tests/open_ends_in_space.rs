@@ -342,26 +342,55 @@ fn debug_walls() {
     chute.part = 0.2;
     chute.rows = 8;
     let h = chute.h();
-    let wall = WallFriction { friction: 0.2, cohesion: 0.0 };
+    let wall = WallFriction {
+        friction: 0.2,
+        cohesion: 0.0,
+    };
     for n in [0, 2, 4, 8] {
         let (heights, speeds, strips) = if n == 0 {
-            let walls = colluvium_continuum::wall_friction::SideWalls { width: 4.0 * h, friction: wall };
+            let walls = colluvium_continuum::wall_friction::SideWalls {
+                width: 4.0 * h,
+                friction: wall,
+            };
             let mut flow = chute.in_plane(1.0).between_side_walls(walls).unwrap();
             while flow.state().time < 1.5 - 1e-9 {
                 flow.step(1.5 - flow.state().time).unwrap();
             }
             (flow.heights(), flow.state().velocity[0].clone(), 1)
         } else {
-            let b = Boundary::CoulombWall { velocity: 0.0, friction: wall };
-            let axis = bounded(2.0 * h / n as f64 , n, b, SMOOTH);
+            let b = Boundary::CoulombWall {
+                velocity: 0.0,
+                friction: wall,
+            };
+            let axis = bounded(2.0 * h / n as f64, n, b, SMOOTH);
             let mut flow = chute.in_space(axis, &vec![1.0; n]);
             run_to(&mut flow, 1.5);
             (flow.heights(), flow.state().velocity[0].clone(), n)
         };
         let width = chute.columns + 1;
-        let mean = |column: usize| (0..strips).map(|s| heights[s * chute.columns + column]).sum::<f64>() / strips as f64;
-        let u = |row: usize, column: usize| (0..strips).map(|s| speeds[(row * strips + s) * width + column]).sum::<f64>() / strips as f64;
-        println!("{n}: depth {:.4} {:.4}, u {:.4} {:.4} {:.4} of {:.4} {:.4} {:.4}", mean(5), mean(9), u(0, 7), u(2, 7), u(4, 7), chute.speed(0), chute.speed(2), chute.speed(4));
+        let mean = |column: usize| {
+            (0..strips)
+                .map(|s| heights[s * chute.columns + column])
+                .sum::<f64>()
+                / strips as f64
+        };
+        let u = |row: usize, column: usize| {
+            (0..strips)
+                .map(|s| speeds[(row * strips + s) * width + column])
+                .sum::<f64>()
+                / strips as f64
+        };
+        println!(
+            "{n}: depth {:.4} {:.4}, u {:.4} {:.4} {:.4} of {:.4} {:.4} {:.4}",
+            mean(5),
+            mean(9),
+            u(0, 7),
+            u(2, 7),
+            u(4, 7),
+            chute.speed(0),
+            chute.speed(2),
+            chute.speed(4)
+        );
     }
 }
 

@@ -108,4 +108,8 @@ impl<L: ShearLaw + Clone> SpaceChute<L> {
         let flow = SpaceFlow::in_space(grid, start, law, [g.0, 0.0, -g.1], *options)?;
         Self::fed(case, flow, across.cells)
     }
+    /// Whether all of the breadth is computed, so that the chute has a mirror image.
+    pub fn is_whole(&self) -> bool {
+        self.flow.grid().axes()[1].is_alike()
+    }
 }
