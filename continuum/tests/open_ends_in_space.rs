@@ -5,7 +5,7 @@ use colluvium_continuum::free_surface::{
 };
 use colluvium_continuum::grid::{Axis, Boundary, Grid};
 use colluvium_continuum::rheology::MuI;
-use colluvium_continuum::wall_friction::WallFriction;
+use colluvium_continuum::wall_friction::{SideWalls, WallFriction};
 use rayon::ThreadPoolBuilder;
 
 const SLOPE: f64 = 0.43;
@@ -198,11 +198,13 @@ fn apart(plane: &[f64], space: &[f64], width: usize, across: usize) -> f64 {
         .fold(0.0, |most, (a, b)| most.max((a - b).abs()))
 }
 
-/// The same velocity, pressure and shear in all strips as in the plane, to the solver's tolerance, whatever enters and
-/// whether the uppermost cells have a pressure: the operators at the ends.
+/// The operators at the ends. Where the uppermost cells have a pressure of their own, velocity and pressure of a step are those of
+/// the plane in all strips, to round-off, though what enters is 1.3 times as fast as what is there; under layers without one to
+/// 5e-6. (Such layers need not keep their volume, and the deviator of a strain rate with a trace is another one in space:
+/// fed with 1.2 times what is there, 2e-2 in the speed of the layer, 2e-5 below it.)
 #[test]
 fn velocities_between_open_ends_are_those_of_the_plane() {
-    for (part, factor) in [(0.3, 1.0), (0.3, 1.2), (0.7, 1.3)] {
+    for (part, factor, most) in [(0.3, 1.0, 1e-5), (0.7, 1.3, 1e-10)] {
         let mut chute = Chute::new(6).exact();
         chute.part = part;
         let mut plane = chute.in_plane(factor);
@@ -219,16 +221,22 @@ fn velocities_between_open_ends_are_those_of_the_plane() {
             println!(
                 "{name}, {part} of a cell, {factor}: u {speed:.1e}, w {upwards:.1e}, p {pressure:.1e}"
             );
+            assert!(speed.max(upwards).max(pressure) < most, "{name}");
         }
     }
 }
 
-/// Plane flow through a chute in space, with what passed the ends.
+/// Plane flow through a chute in space, and what passed its ends. The layer that is fed as it flows is that of the plane to the
+/// solver's tolerance. Fed with 1.03 of it the surface slopes, which space reconstructs from taller columns of cells than
+/// the plane: 1e-4 of the depth. Volume is accounted for to round-off, and the same enters; fed with more the depths differ: negative
+/// control.
 #[test]
 fn plane_flow_through_open_ends_is_that_of_the_plane() {
     let end = 0.4;
-    for factor in [1.0, 1.03] {
-        let chute = Chute::new(6).exact();
+    let mut others: Vec<Vec<f64>> = Vec::new();
+    for (factor, part, most) in [(1.0, 0.3, 1e-6), (1.03, 0.7, 1e-3)] {
+        let mut chute = Chute::new(6).exact();
+        chute.part = part;
         let mut plane = chute.in_plane(factor);
         while plane.state().time < end - 1e-9 {
             plane.step(end - plane.state().time).unwrap();
@@ -247,11 +255,21 @@ fn plane_flow_through_open_ends_is_that_of_the_plane() {
                 "{factor}, {name}: depth {depth:.1e}, passed {passed:?}, volume {balance:.1e}, {} steps",
                 s.steps
             );
+            assert!(
+                depth < most && passed[0] < 1e-14 && passed[1] < most,
+                "{name}"
+            );
+            assert!(balance < 1e-13, "{name}: {balance:e}");
         }
+        others.push(plane.heights());
     }
+    let differ = others[0].iter().zip(&others[1]);
+    let differ = differ.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+    assert!(differ > 3e-3, "{differ}");
 }
 
-/// Steady Bagnold flow passes through a chute with periodic or smooth sides; velocity and depth are off by less on finer cells.
+/// Steady Bagnold flow passes through a chute with periodic or smooth sides as it is, the same in all strips: off by 4.1e-4 in
+/// velocity and 2.5e-4 in depth on 6 cells, 1.7e-4 and 7.5e-5 on 12, of order 1.3 and 1.7 as in the plane.
 #[test]
 fn bagnold_flow_passes_through_in_space() {
     let across = |chute: &Chute, periodic: bool| match periodic {
@@ -279,119 +297,85 @@ fn bagnold_flow_passes_through_in_space() {
         });
         let order = [0, 1].map(|n| (coarse[n] / fine[n]).log2());
         println!("periodic {periodic}: {coarse:?} on 6 cells, {fine:?} on 12, order {order:?}");
+        assert!(
+            coarse[0] < 6e-4 && coarse[1] < 4e-4 && order[0] > 1.1 && order[1] > 1.5,
+            "{coarse:?} {fine:?}"
+        );
+        assert!(coarse[2] < 1e-8 && fine[2] < 1e-8, "{coarse:?} {fine:?}");
     }
 }
 
-/// A chute whose side walls rub, and an inflow that is faster in the middle: both are their own mirror images, and become steady;
-/// beside rubbing walls the flow is slower and the layer deeper than with smooth ones.
+/// Side walls that rub, and an inflow that is faster in the middle: both flows are their own mirror images to round-off and
+/// become steady. Friction of the walls thickens the layer by as much as the plane solver finds that spreads it over the breadth (Jop's
+/// side walls, 1.2 % at the end; measured 1.2 %); beside the walls the flow is slower. Smooth walls change nothing: negative control.
 #[test]
 fn flow_that_varies_across_is_its_own_mirror_image() {
     let mut chute = Chute::new(5).exact();
     chute.part = 0.2;
     chute.rows = 8;
-    let rubbing = Boundary::CoulombWall {
-        velocity: 0.0,
-        friction: WallFriction {
-            friction: 0.2,
-            cohesion: 0.0,
-        },
-    };
-    let peaked = [1.0, 1.15, 1.15, 1.0];
-    let even = [1.0; 4];
-    for (name, wall, factors) in [
-        ("rubbing walls", rubbing, even),
-        ("faster in the middle", SMOOTH, peaked),
-        ("smooth walls", SMOOTH, even),
-    ] {
-        let mut flow = chute.in_space(bounded(chute.h(), 4, wall, wall), &factors);
-        let before = flow.volume();
-        run_to(&mut flow, 1.0);
-        let earlier = flow.state().velocity[0].clone();
-        run_to(&mut flow, 1.5);
-        let state = flow.state();
-        let width = chute.columns + 1;
-        let skew = asymmetry(&state.fractions, chute.columns, 4).max(asymmetry(
-            &state.velocity[0],
-            width,
-            4,
-        ));
-        let change = earlier.iter().zip(&state.velocity[0]);
-        let change = change.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
-        // Speeds near the surface beside the wall and inside, most of the way down.
-        let at = |strip: usize| {
-            let row = 3 * 4 + strip;
-            state.velocity[0][row * width + 3 * chute.columns / 4]
-        };
-        let balance = volume_error(&flow, before);
-        let heights = flow.heights();
-        println!(
-            "{name}: skew {skew:.1e}, change {change:.1e}, speeds {:.4} and {:.4} of {:.4}, depths {:.4} {:.4}, volume {balance:.1e}, steps {}",
-            at(0),
-            at(1),
-            chute.speed(3),
-            heights[chute.columns - 2],
-            heights[2 * chute.columns - 2],
-            state.steps
-        );
-    }
-}
-
-#[test]
-fn debug_walls() {
-    let mut chute = Chute::new(5).exact();
-    chute.part = 0.2;
-    chute.rows = 8;
-    let h = chute.h();
-    let wall = WallFriction {
+    let (h, end) = (chute.h(), 1.2);
+    let friction = WallFriction {
         friction: 0.2,
         cohesion: 0.0,
     };
-    for n in [0, 2, 4, 8] {
-        let (heights, speeds, strips) = if n == 0 {
-            let walls = colluvium_continuum::wall_friction::SideWalls {
-                width: 4.0 * h,
-                friction: wall,
-            };
-            let mut flow = chute.in_plane(1.0).between_side_walls(walls).unwrap();
-            while flow.state().time < 1.5 - 1e-9 {
-                flow.step(1.5 - flow.state().time).unwrap();
-            }
-            (flow.heights(), flow.state().velocity[0].clone(), 1)
-        } else {
-            let b = Boundary::CoulombWall {
-                velocity: 0.0,
-                friction: wall,
-            };
-            let axis = bounded(2.0 * h / n as f64, n, b, SMOOTH);
-            let mut flow = chute.in_space(axis, &vec![1.0; n]);
-            run_to(&mut flow, 1.5);
-            (flow.heights(), flow.state().velocity[0].clone(), n)
-        };
-        let width = chute.columns + 1;
-        let mean = |column: usize| {
-            (0..strips)
-                .map(|s| heights[s * chute.columns + column])
-                .sum::<f64>()
-                / strips as f64
-        };
-        let u = |row: usize, column: usize| {
-            (0..strips)
-                .map(|s| speeds[(row * strips + s) * width + column])
-                .sum::<f64>()
-                / strips as f64
-        };
-        println!(
-            "{n}: depth {:.4} {:.4}, u {:.4} {:.4} {:.4} of {:.4} {:.4} {:.4}",
-            mean(5),
-            mean(9),
-            u(0, 7),
-            u(2, 7),
-            u(4, 7),
-            chute.speed(0),
-            chute.speed(2),
-            chute.speed(4)
-        );
+    let walls = SideWalls {
+        width: 4.0 * h,
+        friction,
+    };
+    let mut plane = chute.in_plane(1.0).between_side_walls(walls).unwrap();
+    while plane.state().time < end - 1e-9 {
+        plane.step(end - plane.state().time).unwrap();
     }
+    let last = chute.columns - 1;
+    let spread = plane.heights()[last] - 1.0;
+    let rubbing = Boundary::CoulombWall {
+        velocity: 0.0,
+        friction,
+    };
+    let even = [1.0; 4];
+    let [rubbed, peaked, smooth] = [
+        ("rubbing walls", rubbing, even),
+        ("faster in the middle", SMOOTH, [1.0, 1.15, 1.15, 1.0]),
+        ("smooth walls", SMOOTH, even),
+    ]
+    .map(|(name, wall, factors)| {
+        let mut flow = chute.in_space(bounded(h, 4, wall, wall), &factors);
+        let before = flow.volume();
+        run_to(&mut flow, 0.8);
+        let earlier = flow.heights();
+        run_to(&mut flow, end);
+        let (state, width) = (flow.state(), chute.columns + 1);
+        let skew = asymmetry(&state.fractions, chute.columns, 4)
+            .max(asymmetry(&state.velocity[0], width, 4))
+            .max(asymmetry(&state.velocity[2], chute.columns, 4));
+        let heights = flow.heights();
+        let change = earlier.iter().zip(&heights);
+        let change = change.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
+        // Near the surface, most of the way down.
+        let speeds = [0, 1].map(|strip| {
+            state.velocity[0][(3 * 4 + strip) * width + 3 * chute.columns / 4] / chute.speed(3)
+        });
+        let strips = heights.chunks_exact(chute.columns);
+        let deeper = strips.map(|strip| strip[last] - 1.0).sum::<f64>() / 4.0;
+        let balance = volume_error(&flow, before);
+        println!(
+            "{name}: skew {skew:.1e}, depth changes by {change:.1e}, speeds beside the wall and inside {speeds:.4?}, deeper by {deeper:.5} ({spread:.5} in the plane), volume {balance:.1e}, {} steps",
+            state.steps
+        );
+        assert!(skew < 1e-11 && balance < 1e-13, "{name}: {skew:e} {balance:e}");
+        assert!(change < 2e-3, "{name}: {change:e}");
+        (speeds, deeper)
+    });
+    assert!(
+        (rubbed.1 / spread - 1.0).abs() < 0.15,
+        "{rubbed:?} {spread}"
+    );
+    assert!(rubbed.0[0] < rubbed.0[1] - 0.01, "{rubbed:?}");
+    assert!(peaked.0[1] > peaked.0[0] + 0.05, "{peaked:?}");
+    assert!(
+        smooth.1.abs() < 3e-4 && (smooth.0[0] - smooth.0[1]).abs() < 1e-9,
+        "{smooth:?}"
+    );
 }
 
 /// A heap in the middle of a chute that is closed above, beside a plane of symmetry; free at a distance of so many heights.
@@ -427,51 +411,38 @@ fn heap(length: usize, open: bool) -> SpaceFlow<MuI> {
     }
 }
 
-/// A heap runs down a chute and out of its open end, as if it went on beyond it; at a closed end it piles up.
+/// A heap spreads, runs down a chute and out of its open end as if the chute went on: beside one twice as long the depth (its mean
+/// across) differs by 5.6 % in the last cell before the end, 1.3 % in the one before that, 0.3 % in all others, and what has
+/// left by 0.5 %. At a closed end it piles up to five times that depth: negative control.
 #[test]
 fn a_heap_leaves_through_the_open_end() {
-    let end = 3.5;
-    let lengths = [(2, true), (4, true), (2, false)];
-    let flows = lengths.map(|(length, open)| {
+    let (end, short_cells, across) = (3.5, 12, 6);
+    let [short, long, closed] = [(2, true), (4, true), (2, false)].map(|(length, open)| {
         let mut flow = heap(length, open);
         let before = flow.volume();
         run_to(&mut flow, end);
-        println!(
-            "{length} {open}: volume {:.1e}, left {:.4} of {before:.4}, steps {}",
-            volume_error(&flow, before),
-            flow.state().passed[1],
-            flow.state().steps
-        );
+        let balance = volume_error(&flow, before);
+        assert!(balance < 1e-13, "{length} {open}: {balance:e}");
         flow
     });
-    let [short, long, closed] = &flows;
-    let beyond: f64 = long
-        .heights()
-        .chunks_exact(24)
-        .map(|strip| strip[12..].iter().sum::<f64>() / 36.0)
-        .sum();
-    println!(
-        "{} left, {} beyond",
-        short.state().passed[1],
-        beyond + long.state().passed[1]
-    );
-    let columns = 12;
-    let mean = |flow: &SpaceFlow<MuI>, column: usize| {
-        let width = flow.grid().axes()[0].cells();
-        flow.heights()
-            .chunks_exact(width)
-            .map(|s| s[column])
-            .sum::<f64>()
-            / 6.0
+    let depth = |flow: &SpaceFlow<MuI>, column: usize| {
+        let heights = flow.heights();
+        let strips = heights.chunks_exact(heights.len() / across);
+        strips.map(|strip| strip[column]).sum::<f64>() / across as f64
     };
-    for column in 0..columns {
-        println!(
-            "{column}: {:.4} {:.4} {:.4}",
-            mean(short, column),
-            mean(long, column),
-            mean(closed, column)
-        );
-    }
+    let off = |column: usize| (depth(&short, column) / depth(&long, column) - 1.0).abs();
+    let inside = (0..short_cells - 2).map(off).fold(0.0, f64::max);
+    let [before, last] = [2, 1].map(|n| off(short_cells - n));
+    let beyond = (short_cells..2 * short_cells).map(|column| depth(&long, column));
+    let beyond = beyond.sum::<f64>() / 6.0 + long.state().passed[1];
+    let left = short.state().passed[1];
+    let pile = depth(&closed, short_cells - 1) / depth(&long, short_cells - 1);
+    println!(
+        "depth off by {last:.4} in the last cell, {before:.4} before it, {inside:.4} elsewhere; {left:.5} left, {beyond:.5} gone on; closed {pile:.2} times as deep"
+    );
+    assert!(last < 0.08 && before < 0.02 && inside < 5e-3);
+    assert!((left / beyond - 1.0).abs() < 0.01 && left > 0.1);
+    assert!(pile > 3.0, "{pile}");
 }
 
 /// A flow stopped in the middle goes on to the same bits, and so it does on two threads.
@@ -481,7 +452,7 @@ fn restarts_and_threads_change_no_bit() {
     chute.columns = 18;
     let across = bounded(chute.h(), 8, SMOOTH, SMOOTH);
     let factors = [0.8, 0.9, 1.1, 1.0, 0.9, 0.9, 1.0, 1.0];
-    let end = 0.16;
+    let end = 0.1;
     let run = |threads: usize, stop: Option<f64>| -> SpaceState {
         let pool = ThreadPoolBuilder::new()
             .num_threads(threads)
@@ -501,10 +472,9 @@ fn restarts_and_threads_change_no_bit() {
         })
     };
     let whole = run(1, None);
-    println!("{} steps, {:?}", whole.steps, whole.passed);
     assert!(whole.passed[1] > 0.0 && whole.steps > 10);
     assert_eq!(whole, run(2, None));
-    assert_eq!(whole, run(1, Some(0.08)));
+    assert_eq!(whole, run(1, Some(0.05)));
 }
 
 #[test]
