@@ -228,13 +228,13 @@ fn velocities_between_open_ends_are_those_of_the_plane() {
 
 /// Plane flow through a chute in space, and what passed its ends. The layer that is fed as it flows is that of the plane to the
 /// solver's tolerance. Fed with 1.03 of it the surface slopes, which space reconstructs from taller columns of cells than
-/// the plane: 1e-4 of the depth. Volume is accounted for to round-off, and the same enters; fed with more the depths differ: negative
-/// control.
+/// the plane: 3e-5 of the depth. Volume is accounted for to round-off, and the same enters; the two flows differ by 2e-3 of the
+/// depth: negative control.
 #[test]
 fn plane_flow_through_open_ends_is_that_of_the_plane() {
     let end = 0.4;
     let mut others: Vec<Vec<f64>> = Vec::new();
-    for (factor, part, most) in [(1.0, 0.3, 1e-6), (1.03, 0.7, 1e-3)] {
+    for (factor, part, most) in [(1.0, 0.3, 1e-6), (1.03, 0.7, 1e-4)] {
         let mut chute = Chute::new(6).exact();
         chute.part = part;
         let mut plane = chute.in_plane(factor);
@@ -265,7 +265,7 @@ fn plane_flow_through_open_ends_is_that_of_the_plane() {
     }
     let differ = others[0].iter().zip(&others[1]);
     let differ = differ.fold(0.0_f64, |most, (a, b)| most.max((a - b).abs()));
-    assert!(differ > 3e-3, "{differ}");
+    assert!(differ > 1e-3, "{differ}");
 }
 
 /// Steady Bagnold flow passes through a chute with periodic or smooth sides as it is, the same in all strips: off by 4.1e-4 in
