@@ -313,7 +313,7 @@ fn flow_that_varies_across_is_its_own_mirror_image() {
     let mut chute = Chute::new(5).exact();
     chute.part = 0.2;
     chute.rows = 8;
-    let (h, end) = (chute.h(), 1.2);
+    let (h, end) = (chute.h(), 1.5);
     let friction = WallFriction {
         friction: 0.2,
         cohesion: 0.0,
@@ -341,7 +341,7 @@ fn flow_that_varies_across_is_its_own_mirror_image() {
     .map(|(name, wall, factors)| {
         let mut flow = chute.in_space(bounded(h, 4, wall, wall), &factors);
         let before = flow.volume();
-        run_to(&mut flow, 0.8);
+        run_to(&mut flow, 1.1);
         let earlier = flow.heights();
         run_to(&mut flow, end);
         let (state, width) = (flow.state(), chute.columns + 1);
@@ -363,7 +363,7 @@ fn flow_that_varies_across_is_its_own_mirror_image() {
             state.steps
         );
         assert!(skew < 1e-11 && balance < 1e-13, "{name}: {skew:e} {balance:e}");
-        assert!(change < 2e-3, "{name}: {change:e}");
+        assert!(change < 3e-3, "{name}: {change:e}");
         (speeds, deeper)
     });
     assert!(
@@ -412,7 +412,7 @@ fn heap(length: usize, open: bool) -> SpaceFlow<MuI> {
 }
 
 /// A heap spreads, runs down a chute and out of its open end as if the chute went on: beside one twice as long the depth (its mean
-/// across) differs by 5.6 % in the last cell before the end, 1.3 % in the one before that, 0.3 % in all others, and what has
+/// across) differs by 5.6 % in the last cell before the end, 1.2 % in the one before that, at most 0.4 % in all others, and what has
 /// left by 0.5 %. At a closed end it piles up to five times that depth: negative control.
 #[test]
 fn a_heap_leaves_through_the_open_end() {
@@ -452,7 +452,7 @@ fn restarts_and_threads_change_no_bit() {
     chute.columns = 18;
     let across = bounded(chute.h(), 8, SMOOTH, SMOOTH);
     let factors = [0.8, 0.9, 1.1, 1.0, 0.9, 0.9, 1.0, 1.0];
-    let end = 0.1;
+    let end = 0.12;
     let run = |threads: usize, stop: Option<f64>| -> SpaceState {
         let pool = ThreadPoolBuilder::new()
             .num_threads(threads)
@@ -472,7 +472,7 @@ fn restarts_and_threads_change_no_bit() {
         })
     };
     let whole = run(1, None);
-    assert!(whole.passed[1] > 0.0 && whole.steps > 10);
+    assert!(whole.passed[1] > 0.0 && whole.steps > 8);
     assert_eq!(whole, run(2, None));
     assert_eq!(whole, run(1, Some(0.05)));
 }

@@ -137,11 +137,7 @@ trait Shown {
 impl<L: ShearLaw + Clone> Shown for OpenChute<L> {
     fn frame(&self, inertia: f64) -> Frame {
         let cells = self.fields();
-        let fields = SurfaceFields {
-            cells: &cells,
-            inertia,
-            others: 0,
-        };
+        let fields = SurfaceFields::of_material(&cells, inertia);
         Frame {
             time: self.time(),
             cells: Cells::Quadrilaterals,
@@ -158,11 +154,7 @@ impl<L: ShearLaw + Clone> Shown for OpenChute<L> {
 impl<L: ShearLaw + Clone> Shown for SpaceChute<L> {
     fn frame(&self, inertia: f64) -> Frame {
         let cells = self.fields();
-        let fields = SurfaceFields {
-            cells: &cells,
-            inertia,
-            others: 0,
-        };
+        let fields = SurfaceFields::of_material(&cells, inertia);
         fields.of_space(&[], self.time())
     }
 

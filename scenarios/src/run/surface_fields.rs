@@ -25,7 +25,16 @@ pub(super) struct SurfaceFields<'a, const D: usize, const C: usize> {
     pub others: usize,
 }
 
-impl<const D: usize, const C: usize> SurfaceFields<'_, D, C> {
+impl<'a, const D: usize, const C: usize> SurfaceFields<'a, D, C> {
+    /// Fields of material alone.
+    pub fn of_material(cells: &'a [CellFields<D, C>], inertia: f64) -> Self {
+        Self {
+            cells,
+            inertia,
+            others: 0,
+        }
+    }
+
     fn padded<T: Clone>(&self, nothing: T, of: &dyn Fn(&CellFields<D, C>) -> T) -> Vec<T> {
         let others = std::iter::repeat_n(nothing, self.others);
         self.cells.iter().map(of).chain(others).collect()
