@@ -81,7 +81,7 @@ pub use law::{
     CohesionKind, LawKeys, LeverKind, MemoryKind, NormalKind, Parts, RollingKind, TangentialKind,
 };
 pub use layer_case::{LayerCase, LayerVisitor};
-pub use open_chute::{InflowKeys, OpenChuteGrid, OpenChuteScene};
+pub use open_chute::{AcrossKeys, InflowKeys, OpenChuteGrid, OpenChuteScene};
 pub use overlap::{InclineModel, NormalMotionKind, OverlapKeys};
 pub use settle::{SettleFloor, SettleGrains, SettleScene};
 pub use sheared::{ExactFlow, ShearedCase, ShearedScene};
