@@ -1,6 +1,6 @@
 //! A continuum that ends at grains on one side or on both.
 //!
-//! Its grid has one axis, that of the last of its edges, the *keeper*: in the keeper's account stands what concerns the continuum as a
+//! Its grid has one axis, that of one of its edges, the *keeper*: in the keeper's account stands what concerns the continuum as a
 //! whole, its weight and the steps that it makes. An edge at its other end sees it in a mirror, and what that one does to it is
 //! turned back where it is put together with what the keeper does. A cell bears the grains of that edge which has more of them there;
 //! forces of both are added.
@@ -9,7 +9,7 @@ use super::account::{Account, Monitors};
 use super::cells::Cells;
 use super::copy::ROUNDED;
 use super::side::{Side, mirror_rows};
-use super::{MaterialEdge, MaterialEdgeSpec, NEARLY, OverlapError, start};
+use super::{MaterialEdge, MaterialEdgeSpec, NEARLY, OverlapError, layout, start};
 use colluvium_continuum::column_collapse::Collapse;
 use colluvium_continuum::free_surface::SurfaceState;
 use colluvium_dem::GrainSample;
@@ -23,18 +23,20 @@ pub struct Continuum {
     /// Mass of it, copies included, and of what rests behind it (kg).
     pub(super) mass: f64,
     pub(super) rest_mass: f64,
-    /// Which edges of its zone are its own.
+    /// Which edges of its zone are its own, and which of those is the keeper.
     pub(super) edges: Range<usize>,
+    pub(super) keeper: usize,
 }
 
 impl Continuum {
     /// Of grains that lie where it will be, seen along its keeper's axis.
     pub(super) fn of_grains<'a>(
-        spec: MaterialEdgeSpec,
+        specs: &[MaterialEdgeSpec],
         edges: Range<usize>,
         grains: impl Iterator<Item = &'a GrainSample>,
         timestep: f64,
     ) -> Result<Self, OverlapError> {
+        let spec = specs[layout::keeper(specs, &edges)];
         let [_, inner] = spec.zones();
         // With grains on both sides of it, those on the far side are not its own.
         let begins = match edges.len() > 1 {
@@ -49,16 +51,18 @@ impl Continuum {
                 before += grain.mass;
             }
         }
-        Self::standing(spec, edges, [before, behind], timestep)
+        Self::standing(specs, edges, [before, behind], timestep)
     }
 
     /// Of a mass, and another that rests behind it (kg), before anything moves.
     pub(super) fn standing(
-        spec: MaterialEdgeSpec,
+        specs: &[MaterialEdgeSpec],
         edges: Range<usize>,
         [mass, rest_mass]: [f64; 2],
         timestep: f64,
     ) -> Result<Self, OverlapError> {
+        let keeper = layout::keeper(specs, &edges);
+        let spec = specs[keeper];
         let steps = MaterialEdge::steps_of_loads(&spec.settings, timestep);
         let load_time = steps as f64 * timestep;
         let loads = MaterialEdge::loads_of_exchange(&spec.settings, timestep);
@@ -83,6 +87,7 @@ impl Continuum {
             collapse,
             mass,
             rest_mass,
+            keeper: keeper - edges.start,
             edges,
         })
     }
@@ -100,6 +105,15 @@ impl Continuum {
     /// What its keeper was made from.
     pub fn spec(&self) -> &MaterialEdgeSpec {
         &self.spec
+    }
+
+    /// Its keeper among its edges, and the other one.
+    pub(super) fn parted<'e>(
+        &self,
+        edges: &'e [MaterialEdge],
+    ) -> Option<(&'e MaterialEdge, Option<&'e MaterialEdge>)> {
+        let keeper = edges.get(self.keeper)?;
+        Some((keeper, edges.get(1 - self.keeper)))
     }
 
     /// Its grid along the axis of an edge.
@@ -180,8 +194,10 @@ impl Continuum {
         edges: &mut [MaterialEdge],
         exchange: u64,
     ) -> Result<(), OverlapError> {
-        let Some((keeper, others)) = edges.split_last_mut() else {
-            return Ok(());
+        let (keeper, mut other) = match (edges, self.keeper) {
+            ([keeper], _) => (keeper, None),
+            ([keeper, other], 0) | ([other, keeper], _) => (keeper, Some(other)),
+            _ => return Ok(()),
         };
         let units = self.collapse.units();
         let unit = units.time();
@@ -190,7 +206,7 @@ impl Continuum {
         let coupled = !self.spec.settings.uncoupled;
         if coupled {
             keeper.press_on_continuum(&units, dt);
-            for other in others {
+            if let Some(other) = &mut other {
                 other.press_on_continuum(&units, dt);
                 keeper.press_with(other);
             }
@@ -217,7 +233,7 @@ impl Continuum {
         }
         let mass = self.collapse.flow().volume() * unit / self.collapse.units().velocity;
         account.continuum_weight[1] -= mass * self.spec.case.gravity * pushed;
-        for edge in edges {
+        for edge in std::iter::once(keeper).chain(other) {
             if coupled {
                 edge.answer(pushed / dt);
             }

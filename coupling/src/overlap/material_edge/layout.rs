@@ -6,7 +6,7 @@
 use super::{LEAST_CELLS, MaterialEdgeSpec, OverlapError, Side};
 use std::ops::Range;
 
-/// Edges of each continuum, along x; the last of them is its keeper.
+/// Edges of each continuum, along x.
 pub(super) fn continua(specs: &[MaterialEdgeSpec]) -> Vec<Range<usize>> {
     let mut all = Vec::new();
     let mut first = 0;
@@ -17,6 +17,15 @@ pub(super) fn continua(specs: &[MaterialEdgeSpec]) -> Vec<Range<usize>> {
         first = end;
     }
     all
+}
+
+/// Which edge keeps a continuum that has these: the one that is nearer to where its grid begins.
+pub(super) fn keeper(specs: &[MaterialEdgeSpec], edges: &Range<usize>) -> usize {
+    let before = |k: usize| specs[k].place - specs[k].wall;
+    match before(edges.start) < before(edges.end - 1) {
+        true => edges.start,
+        false => edges.end - 1,
+    }
 }
 
 /// Between which places along its own axis each edge has its grains at the start (m): up to the middle of a continuum that it shares, and

@@ -1,7 +1,7 @@
 //! All of a zone as numbers: what a run goes on from with the same bits.
 //!
 //! In front stands what every load changes, of a length that does not; behind it what an exchange changes, in rows
-//! with their lengths before them. A continuum stands with the last of its edges.
+//! with their lengths before them. A continuum stands with its keeper.
 
 use super::account::{self, Account, Monitors};
 use super::rows::{self, Row};
@@ -90,7 +90,8 @@ impl MaterialEdge {
 
     /// From what was written of an edge; its keeper's continuum is made before the other edge is read.
     fn read_back(
-        (spec, ours): (MaterialEdgeSpec, [f64; 2]),
+        (specs, k): (&[MaterialEdgeSpec], usize),
+        ours: [f64; 2],
         memory: &[f64],
         (own, known): (Range<usize>, &mut Option<Continuum>),
         simulation: &Simulation,
@@ -119,13 +120,13 @@ impl MaterialEdge {
         let continuum = match known {
             Some(continuum) => continuum,
             None => known.insert(Continuum::standing(
-                spec,
+                specs,
                 own,
                 [mass, rest_mass],
                 simulation.timestep(),
             )?),
         };
-        let mut edge = Self::around(spec, ours, continuum, labels.to_vec(), simulation);
+        let mut edge = Self::around(specs[k], ours, continuum, labels.to_vec(), simulation);
         let Some(base) = take() else {
             return Ok(None);
         };
@@ -228,7 +229,7 @@ impl GrainZone {
             for k in continuum.edges.clone() {
                 let length = memory.len();
                 memory.push(0.0);
-                let keeps = k + 1 == continuum.edges.end;
+                let keeps = k == continuum.edges.start + continuum.keeper;
                 self.edges[k].write(continuum, keeps, memory);
                 memory[length] = (memory.len() - length - 1) as f64;
             }
@@ -273,14 +274,18 @@ impl GrainZone {
         let mut zone = Self::of(Vec::new(), Vec::new());
         for own in layout::continua(specs) {
             let mut continuum = None;
+            let keeper = layout::keeper(specs, &own);
+            let mut order: Vec<usize> = own.clone().collect();
+            order.sort_by_key(|k| *k != keeper);
             let mut edges = Vec::new();
-            for k in own.clone().rev() {
+            for k in order {
                 let known = (own.clone(), &mut continuum);
-                let edge =
-                    MaterialEdge::read_back((specs[k], ours[k]), memories[k], known, simulation)?;
-                edges.push(edge.ok_or_else(damaged)?);
+                let memory = memories[k];
+                let edge = MaterialEdge::read_back((specs, k), ours[k], memory, known, simulation)?;
+                edges.push((k, edge.ok_or_else(damaged)?));
             }
-            zone.edges.extend(edges.into_iter().rev());
+            edges.sort_by_key(|(k, _)| *k);
+            zone.edges.extend(edges.into_iter().map(|(_, edge)| edge));
             zone.continua.extend(continuum);
         }
         zone.grain_steps = head[1];

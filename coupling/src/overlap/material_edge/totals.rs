@@ -11,12 +11,12 @@ const PARTS: usize = 4;
 impl Continuum {
     /// Between which places along its own axis totals count it, row by row (m).
     pub(super) fn counted(&self, edges: &[MaterialEdge]) -> Vec<[f64; 2]> {
-        let Some((keeper, others)) = edges.split_last() else {
+        let Some((keeper, other)) = self.parted(edges) else {
             return Vec::new();
         };
         let begins = |row: usize| {
-            let others = others.iter().map(|other| -other.held.handshake[row]);
-            others.fold(f64::NEG_INFINITY, f64::max)
+            let other = other.map(|other| -other.held.handshake[row]);
+            other.unwrap_or(f64::NEG_INFINITY)
         };
         let ends = keeper.held.handshake.iter().enumerate();
         ends.map(|(row, end)| [begins(row), *end]).collect()
@@ -43,11 +43,11 @@ impl Continuum {
         self.collapse.fields().into_iter().map(turned).collect()
     }
 
-    /// Height, copies included, over each column of cells (m), along its own axis.
+    /// Height, copies included, over each column of cells, and their places along x (m).
     pub fn heights(&self) -> (Vec<f64>, Vec<f64>) {
         let (mut places, heights) = self.collapse.profile();
         for place in &mut places {
-            *place += self.spec.wall;
+            *place = self.spec.side.along(*place + self.spec.wall);
         }
         (places, heights)
     }
@@ -125,7 +125,7 @@ impl GrainZone {
         known.next() == Some(true) && known.all(|is_in_front| is_in_front)
     }
 
-    /// The edges of a continuum, its keeper last.
+    /// The edges of a continuum.
     fn edges_of(&self, continuum: &Continuum) -> &[MaterialEdge] {
         self.edges.get(continuum.edges.clone()).unwrap_or_default()
     }
@@ -135,9 +135,8 @@ impl GrainZone {
         let of = |continuum: &Continuum| {
             let edges = self.edges_of(continuum);
             let counted = continuum.counted(edges);
-            edges
-                .last()
-                .map_or(0.0, |keeper| continuum.kinetic(&keeper.view, &counted))
+            let keeper = edges.get(continuum.keeper);
+            keeper.map_or(0.0, |keeper| continuum.kinetic(&keeper.view, &counted))
         };
         self.continua.iter().map(of).sum()
     }

@@ -42,11 +42,11 @@ impl GrainZone {
         let mut zone = Self::of(Vec::new(), Vec::new());
         let ours = layout::grains(specs);
         for own in layout::continua(specs) {
-            let keeper = specs[own.end - 1];
+            let keeper = layout::keeper(specs, &own);
             let mut seen = Sighting::default();
-            seen.look_along(keeper.side, simulation);
+            seen.look_along(specs[keeper].side, simulation);
             let free = seen.snapshot.grains.iter().filter(|g| !g.fixed);
-            let continuum = Continuum::of_grains(keeper, own.clone(), free, simulation.timestep())?;
+            let continuum = Continuum::of_grains(specs, own.clone(), free, simulation.timestep())?;
             for k in own {
                 let mut seen = Sighting::default();
                 seen.look_along(specs[k].side, simulation);
@@ -66,7 +66,7 @@ impl GrainZone {
         }
         for continuum in &mut zone.continua {
             let edges = &mut zone.edges[continuum.edges.clone()];
-            if let Some(keeper) = edges.last_mut() {
+            if let Some(keeper) = edges.get_mut(continuum.keeper) {
                 keeper.account.continuum_before = keeper.spec.side.in_plane(continuum.momentum());
             }
             continuum.prime(edges)?;
