@@ -9,6 +9,8 @@ use std::fmt;
 
 /// Fewest diameters of grains between overlaps, or in front of one.
 pub(super) const LEAST_GRAINS: f64 = 4.0;
+/// Fewest cells of a continuum between two edges.
+const LEAST_BETWEEN: f64 = 3.0;
 
 /// Low and high ends along x (m), rising.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
@@ -111,6 +113,10 @@ impl CollapseScene {
         let [least, _] = self.edge_range(0.0);
         for ends in &continua {
             let [from, to] = [ends[0].unwrap_or(0.0), ends[1].unwrap_or(width)];
+            let least = match ends {
+                [Some(_), Some(_)] => least.max(LEAST_BETWEEN * self.spacing()),
+                _ => least,
+            };
             if to - from >= least * (1.0 - 1e-12) {
                 continue;
             }
