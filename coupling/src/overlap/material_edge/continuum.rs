@@ -205,9 +205,9 @@ impl Continuum {
         let until = exchange as f64 * dt;
         let coupled = !self.spec.settings.uncoupled;
         if coupled {
-            keeper.press_on_continuum(&units, dt);
+            keeper.press_on_continuum(units, dt);
             if let Some(other) = &mut other {
-                other.press_on_continuum(&units, dt);
+                other.press_on_continuum(units, dt);
                 keeper.press_with(other);
             }
             let flow = self.collapse.flow_mut();

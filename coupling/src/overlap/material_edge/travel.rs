@@ -132,8 +132,14 @@ impl MaterialEdge {
 
     /// Puts by what lies behind the edge when it is cut, as strips, as far as the edge may ever come back.
     pub(super) fn put_by(&mut self, travel: &Travel, simulation: &mut Simulation) {
-        let least = super::LEAST_CELLS * self.cells.spacing;
-        let room = self.spec.place - self.spec.back.max(self.ours[0]) - least;
+        let [behind, _] = self.ours;
+        // Of a continuum with an edge at each end, each may take its half.
+        let (end, part) = match behind > self.spec.back {
+            true => (behind, 0.5),
+            false => (self.spec.back, 1.0),
+        };
+        let least = part * super::LEAST_CELLS * self.cells.spacing;
+        let room = self.spec.place - end - least;
         let strips = (room / travel.width).max(0.0) as usize;
         for strip in (0..strips).rev() {
             let patch = simulation.take_out(|g| self.strip(g, travel.width) == Some(strip));
