@@ -253,7 +253,7 @@ impl ShearedScene {
             (_, FrictionLaw::MuI) if r.mu_2 > r.mu_s => return Ok(()),
             (_, FrictionLaw::Table) => {
                 let frictions = r.table.iter().flatten().filter_map(|point| point.get(1));
-                let (first, last) = (frictions.clone().next(), frictions.last());
+                let (first, last) = (frictions.clone().next(), frictions.clone().next_back());
                 if last > first {
                     return Ok(());
                 }
