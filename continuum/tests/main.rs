@@ -17,6 +17,7 @@ mod multigrid;
 mod open_ends;
 mod outside;
 mod sheared_layers;
+mod shores;
 mod space;
 mod steep_ground;
 mod terrain;
