@@ -10,7 +10,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, require};
 use crate::grid::Boundary;
-use crate::layer::{Layer, LayerSolution, Options, Progress, validate_grid};
+use crate::layer::{Layer, LayerRun, LayerSolution, Options, Progress, validate_grid};
 use crate::rheology::{MuI, ShearLaw};
 use crate::units::Units;
 
@@ -88,6 +88,16 @@ impl<L: ShearLaw> PlaneShearCase<L> {
         options: &Options,
         progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<LayerSolution, Error> {
+        let mut run = self.begin(options)?;
+        run.march(progress)?;
+        Ok(self.solution(&run))
+    }
+
+    /// The material at rest, ready to be advanced.
+    ///
+    /// # Errors
+    /// Parameters out of range.
+    pub fn begin(&self, options: &Options) -> Result<LayerRun<L>, Error> {
         self.validate()?;
         let layer = Layer {
             units: Units::of_load(self.gap, self.rheology.bulk_density(), self.load),
@@ -102,11 +112,11 @@ impl<L: ShearLaw> PlaneShearCase<L> {
             rheology: &self.rheology,
             side_walls: None,
         };
-        layer.solve(
-            options,
-            |z| self.exact_velocity(z),
-            |_| self.exact_pressure(),
-            progress,
-        )
+        layer.begin(options, &|_| self.exact_pressure())
+    }
+
+    /// A run's flow as it is, beside the exact solution.
+    pub fn solution(&self, run: &LayerRun<L>) -> LayerSolution {
+        run.solution(|z| self.exact_velocity(z), |_| self.exact_pressure())
     }
 }

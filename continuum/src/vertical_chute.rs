@@ -21,7 +21,7 @@ use serde::{Deserialize, Serialize};
 
 use crate::error::{Error, require};
 use crate::grid::Boundary;
-use crate::layer::{Layer, LayerSolution, Options, Progress, validate_grid};
+use crate::layer::{Layer, LayerRun, LayerSolution, Options, Progress, validate_grid};
 use crate::rheology::shear_law::integral;
 use crate::rheology::{MuI, ShearLaw};
 use crate::units::Units;
@@ -67,7 +67,7 @@ impl<L: ShearLaw> VerticalChuteCase<L> {
             "greater than 0 m/s² and finite",
         )?;
         validate_grid(self.cells, self.columns)?;
-        let wall_stress = self.weight() * self.half_width - law.cohesion();
+        let wall_stress = self.exact_shear_stress(self.half_width) - law.cohesion();
         let [still, fastest] = law.friction_limits();
         require(
             self.load > 0.0
@@ -103,6 +103,11 @@ impl<L: ShearLaw> VerticalChuteCase<L> {
         })
     }
 
+    /// Shear stress ρ g y (Pa) at distance y (m) from the plane of symmetry, exact wherever matter shears or not.
+    pub fn exact_shear_stress(&self, y: f64) -> f64 {
+        self.weight() * y
+    }
+
     /// Exact pressure (Pa), the same everywhere.
     pub fn exact_pressure(&self) -> f64 {
         self.load
@@ -118,6 +123,16 @@ impl<L: ShearLaw> VerticalChuteCase<L> {
         options: &Options,
         progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
     ) -> Result<LayerSolution, Error> {
+        let mut run = self.begin(options)?;
+        run.march(progress)?;
+        Ok(self.solution(&run))
+    }
+
+    /// The material at rest, ready to be advanced.
+    ///
+    /// # Errors
+    /// Parameters out of range.
+    pub fn begin(&self, options: &Options) -> Result<LayerRun<L>, Error> {
         self.validate()?;
         let layer = Layer {
             units: Units::of_load(self.half_width, self.rheology.bulk_density(), self.load),
@@ -132,11 +147,11 @@ impl<L: ShearLaw> VerticalChuteCase<L> {
             rheology: &self.rheology,
             side_walls: None,
         };
-        layer.solve(
-            options,
-            |y| self.exact_velocity(y),
-            |_| self.exact_pressure(),
-            progress,
-        )
+        layer.begin(options, &|_| self.exact_pressure())
+    }
+
+    /// A run's flow as it is, beside the exact solution.
+    pub fn solution(&self, run: &LayerRun<L>) -> LayerSolution {
+        run.solution(|y| self.exact_velocity(y), |_| self.exact_pressure())
     }
 }

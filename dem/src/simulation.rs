@@ -34,6 +34,9 @@ use lists::{LayoutOf, SKIN, hold_of, skin_of};
 use nalgebra::Vector3;
 use std::sync::Arc;
 
+/// Most steps between two offers to threads to stand by.
+const STEPS_A_CALL: u64 = 100;
+
 /// A pass over all grains under the scene's law.
 struct RunPass<'a> {
     simulation: &'a mut Simulation,
@@ -194,12 +197,12 @@ impl Simulation {
             0
         };
         let team = self.team.share();
-        team.with_helpers(helpers, || self.advance_here(steps))
-    }
-
-    fn advance_here(&mut self, steps: u64) -> Result<(), Diverged> {
-        for _ in 0..steps {
-            self.step()?;
+        let mut left = steps;
+        while left > 0 {
+            // Threads that could not be taken on come again with the next call.
+            let now = left.min(STEPS_A_CALL);
+            team.with_helpers(helpers, || (0..now).try_for_each(|_| self.step()))?;
+            left -= now;
         }
         self.check()
     }

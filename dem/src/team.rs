@@ -3,6 +3,13 @@
 //! A step of some ten thousand grains takes a millisecond or less. A thread that has gone to sleep needs a
 //! tenth of that to be woken, twice a step, so threads of the pool wait for work awake as long as a simulation
 //! advances. Meanwhile they do what else there is in the pool, and give way to other programs.
+//!
+//! Whoever stands by waits for the end of the work, so the work must never wait for it. A thread may come to stand by
+//! from within a part of the work that was given to the pool (it waits there for another part, and looks for something to
+//! do); it would wait for the end of work that waits for its part. So a thread is taken on only while tasks of the team
+//! are under way ([`Team::each`]): nothing of the work is in the pool then, as long as tasks give nothing to the pool.
+//! Workers that stand by for each other in a circle are kept out by the same rule: one that stands by elsewhere is within
+//! a call of the pool, and takes nobody on.
 
 use rayon::prelude::*;
 use std::cell::UnsafeCell;
@@ -27,9 +34,6 @@ const PATIENCE: u32 = 2000;
 #[repr(align(128))]
 struct Apart<T>(T);
 
-/// Number of a thread that is none.
-const NOBODY: usize = usize::MAX;
-
 /// See the module.
 pub(crate) struct Team {
     /// Number of the call, and which tasks are given out or are none, by bits: 32 each.
@@ -39,8 +43,8 @@ pub(crate) struct Team {
     /// Threads that stand by, and how many there are to be with the caller.
     helpers: AtomicUsize,
     threads: AtomicUsize,
-    /// The thread of the pool that works while the others stand by.
-    worker: AtomicUsize,
+    /// Whether others are taken on now: tasks are under way.
+    takes_on: AtomicBool,
     /// Whether they may go.
     over: AtomicBool,
     task: UnsafeCell<Option<Task>>,
@@ -61,7 +65,7 @@ impl Default for Team {
             done: Apart::default(),
             helpers: AtomicUsize::new(0),
             threads: AtomicUsize::new(0),
-            worker: AtomicUsize::new(NOBODY),
+            takes_on: AtomicBool::new(false),
             over: AtomicBool::new(false),
             task: UnsafeCell::new(None),
         }
@@ -110,17 +114,15 @@ impl Drop for Leave<'_> {
 }
 
 impl Team {
-    /// Does some work while so many threads of the pool stand by.
+    /// Does some work while at most so many threads of the pool stand by. Those that come while the work has given something
+    /// to the pool are sent away until the next call.
     pub fn with_helpers<T: Send>(&self, helpers: usize, work: impl FnOnce() -> T + Send) -> T {
         if helpers == 0 {
             return work();
         }
         self.over.store(false, Ordering::Release);
         self.threads.store(helpers + 1, Ordering::Release);
-        self.worker.store(NOBODY, Ordering::Release);
         let work = || {
-            let own = rayon::current_thread_index().unwrap_or(NOBODY);
-            self.worker.store(own, Ordering::Release);
             let _release = Release(self);
             work()
         };
@@ -140,8 +142,9 @@ impl Team {
     }
 
     fn wait_for_tasks(&self, own: usize) {
-        // The worker, while it waits for the pool, may come to this itself, and would wait for its own end.
-        if rayon::current_thread_index() == Some(self.worker.load(Ordering::Acquire)) {
+        // See the module. What this thread may be within was given to the pool after others ceased to be taken on,
+        // and they are not until it is done.
+        if !self.takes_on.load(Ordering::Acquire) {
             return;
         }
         self.helpers.fetch_add(1, Ordering::AcqRel);
@@ -159,17 +162,23 @@ impl Team {
         }
     }
 
+    /// Whether there is work for which others may stand by.
+    fn is_at_work(&self) -> bool {
+        self.threads.load(Ordering::Relaxed) > 1 && !self.over.load(Ordering::Relaxed)
+    }
+
     /// Whether anybody stands by.
-    pub fn stands_by(&self) -> bool {
+    #[cfg(test)]
+    fn stands_by(&self) -> bool {
         self.helpers.load(Ordering::Acquire) > 0
     }
 
-    /// Does one thing with each item; if `parallel`, on all threads that stand by, or else in the pool. As far
-    /// as may be, a thread gets the same items in every call: what they hold is in its cache.
+    /// Does one thing with each item, which gives nothing to the pool; if `parallel`, on all threads that stand by, or else in
+    /// the pool. As far as may be, a thread gets the same items in every call: what they hold is in its cache.
     pub fn each<T: Send>(&self, parallel: bool, items: &mut [T], task: &(impl Fn(&mut T) + Sync)) {
         if !parallel || items.len() < 2 {
             items.iter_mut().for_each(task);
-        } else if self.stands_by() && items.len() <= TASKS {
+        } else if self.is_at_work() && items.len() <= TASKS {
             self.share_out(items, task);
         } else {
             items.par_iter_mut().for_each(task);
@@ -193,6 +202,7 @@ impl Team {
         let none = (u32::MAX as u64) << count & u64::from(u32::MAX);
         let call = number.wrapping_add(1) << 32 | none;
         self.call.0.store(call, Ordering::Release);
+        self.takes_on.store(true, Ordering::Release);
         let _wait = Wait { team: self, count };
         while self.take(0) {}
     }
@@ -263,6 +273,7 @@ struct Wait<'a> {
 
 impl Drop for Wait<'_> {
     fn drop(&mut self) {
+        self.team.takes_on.store(false, Ordering::Release);
         let given = self.count - self.team.close();
         let mut looks = 0;
         while self.team.done.0.load(Ordering::Acquire) < given {
@@ -336,16 +347,73 @@ mod tests {
         }
     }
 
-    /// A worker that waits for the pool comes to stand by itself, and does not wait for its own end.
+    /// Threads that wait for the pool, the worker or others within a part of its work, come to stand by, and are not taken
+    /// on: they would wait for the end of work that waits for them. Taken on whenever they came, they hung in the first hundreds
+    /// of these rounds.
     #[test]
-    fn a_worker_does_not_stand_by() {
-        for _ in 0..200 {
-            let team = Team::default();
-            let sum: usize = in_pool(3, || {
-                team.with_helpers(2, || (0..1000_usize).into_par_iter().map(|n| n % 7).sum())
+    fn nobody_who_is_within_the_work_stands_by() {
+        for threads in [2, 3, 8] {
+            in_pool(threads, || {
+                for round in 0..1500 {
+                    let team = Team::default();
+                    let half = || {
+                        let roots = (0..64_usize).into_par_iter().map(|n| {
+                            let root = |x: f64, _| (x + 1.0).sqrt();
+                            (0..500).fold(n as f64, root)
+                        });
+                        assert!(roots.sum::<f64>() > 64.0);
+                        let mut items = [0_u64; 6];
+                        team.each(true, &mut items, &|item| *item += round);
+                        assert_eq!(items, [round; 6]);
+                    };
+                    team.with_helpers(threads - 1, || {
+                        half();
+                        half();
+                    });
+                }
             });
-            assert_eq!(sum, (0..1000).map(|n| n % 7).sum());
         }
+    }
+
+    /// Two workers of one pool, each of which may come to stand by for the other.
+    #[test]
+    fn workers_do_not_wait_for_each_other() {
+        in_pool(4, || {
+            for _ in 0..300 {
+                let sums: Vec<usize> = (0..3_usize)
+                    .into_par_iter()
+                    .with_max_len(1)
+                    .map(|n| {
+                        let team = Team::default();
+                        team.with_helpers(3, || {
+                            let sum: usize = (0..200_usize).into_par_iter().map(|k| k % 7).sum();
+                            let mut items = [n; 6];
+                            team.each(true, &mut items, &|item| *item += sum);
+                            items.iter().sum()
+                        })
+                    })
+                    .collect();
+                let sum: usize = (0..200).map(|k| k % 7).sum();
+                assert_eq!(sums, [6 * sum, 6 * (1 + sum), 6 * (2 + sum)]);
+            }
+        });
+    }
+
+    /// Somebody is taken on while tasks are under way.
+    #[test]
+    fn a_thread_that_comes_late_stands_by() {
+        let team = Team::default();
+        in_pool(2, || {
+            team.with_helpers(1, || {
+                let is_here = |_: &mut usize| {
+                    while !team.stands_by() {
+                        std::thread::yield_now();
+                    }
+                };
+                team.each(true, &mut [0, 1], &is_here);
+            });
+        });
+        assert!(!team.stands_by());
     }
 
     #[test]

@@ -300,7 +300,7 @@ impl Comparison {
             Some(_) if self.of_campaigns() => "the reference campaign; largest relative error of the fitted friction over the range of I that both measured, and of the slopes where flow stops and sets off".to_owned(),
             Some(_) => observables::against_reference(&self.scene),
             None => match self.scene.body {
-                SceneBody::Bagnold(_) => "exact profile, relative L2 error of u".to_owned(),
+                SceneBody::Bagnold(_) | SceneBody::Sheared(_) => "exact profile, relative L2 error of u".to_owned(),
                 _ => "restitution of the scene".to_owned(),
             },
         }
@@ -433,7 +433,10 @@ fn of_one_duration(scene: Scene) -> Result<Scene, SceneError> {
 }
 
 fn has_exact_solution(scene: &Scene) -> bool {
-    matches!(scene.body, SceneBody::Bagnold(_) | SceneBody::Impact(_))
+    matches!(
+        scene.body,
+        SceneBody::Bagnold(_) | SceneBody::Sheared(_) | SceneBody::Impact(_)
+    )
 }
 
 fn exact_error(summary: &Summary) -> f64 {

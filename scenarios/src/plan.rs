@@ -6,6 +6,7 @@ mod cylinder;
 mod joined_incline;
 mod law;
 mod open_chute;
+mod sheared;
 mod world;
 
 use crate::calibrate;
@@ -14,7 +15,7 @@ use crate::run;
 use crate::run::step;
 use crate::scene::{
     BagnoldScene, CollapseModel, FrictionLaw, ImpactScene, InclineScene, InclineStart, LayerCase,
-    RheologyKeys, Scene, SceneBody,
+    RheologyKeys, Scene, SceneBody, SolverKeys,
 };
 use colluvium_coupling::incline::{InclineRun, InclineSpec};
 use colluvium_dem::preparation::settle_incline_bed;
@@ -32,6 +33,7 @@ pub fn plan(scene: &Scene) -> Result<String, Failure> {
             Some(keys) => joined_incline::plan(scene, body, keys),
         },
         SceneBody::Bagnold(body) => bagnold(body),
+        SceneBody::Sheared(body) => sheared::sheared(body),
         SceneBody::Collapse(body) if body.model == CollapseModel::Dem => {
             world::plan(scene, body.as_ref())
         }
@@ -77,6 +79,28 @@ impl Lines {
                 law.source.as_deref().unwrap_or("by numbers")
             ),
         );
+    }
+
+    /// The grid across a layer.
+    fn say_layer_grid(&mut self, cells: usize, columns: Option<usize>) {
+        let along = match columns {
+            Some(columns) => format!("{columns} columns, periodic along the flow"),
+            None => "no axis along the flow: nothing varies along it".to_owned(),
+        };
+        self.say("grid", &format!("{cells} cells across the layer, {along}"));
+    }
+
+    /// The implicit march to a steady flow, its first step over a natural time (s), and what it costs.
+    fn say_march(&mut self, solver: &SolverKeys, natural_time: f64) {
+        self.say(
+            "time step",
+            &format!(
+                "{:.4e} s first, growing by {} a step; implicit in pressure, stress and yield: no stability limit",
+                solver.timestep_scaled * natural_time,
+                solver.growth
+            ),
+        );
+        self.say("cost", "well under a second per 1000 cells and 50 steps");
     }
 
     /// A step, what is said of it, and every other limit with the step that it would allow.
@@ -277,7 +301,7 @@ fn told(flows: &[colluvium_coupling::campaign::Flow]) -> String {
 
 fn bagnold(body: &BagnoldScene) -> Result<String, Failure> {
     let mut lines = Lines::default();
-    let layer = LayerCase::of(body).map_err(run::bagnold::failure)?;
+    let layer = LayerCase::of(body).map_err(run::steady_layer::failure)?;
     let r = &body.rheology;
     lines.say(
         "scene",
@@ -287,19 +311,7 @@ fn bagnold(body: &BagnoldScene) -> Result<String, Failure> {
         ),
     );
     lines.say_rheology(&body.rheology);
-    let columns = body.grid.columns;
-    lines.say(
-        "grid",
-        &format!(
-            "{} cells across the depth, {}",
-            body.cells(),
-            if columns > 1 {
-                format!("{columns} columns periodic downslope")
-            } else {
-                "no downslope axis: nothing varies along it".to_owned()
-            }
-        ),
-    );
+    lines.say_layer_grid(body.cells(), body.grid.columns());
     lines.say("left out", &run::bagnold::LEFT_OUT.join(", "));
     if layer.rests() {
         lines.say("flow", "none: friction and cohesion hold the layer");
@@ -322,23 +334,14 @@ fn bagnold(body: &BagnoldScene) -> Result<String, Failure> {
                 }
             ),
         );
-        if let Some(remark) = run::bagnold::validity_remark(body, &layer, inertial_number) {
+        if let Some(remark) = run::bagnold::validity_remark(body, inertial_number) {
             lines.say("warning", &remark);
         }
     }
     for remark in body.rheology.remarks() {
         lines.say("warning", &remark);
     }
-    let unit = (body.depth / body.gravity).sqrt();
-    lines.say(
-        "time step",
-        &format!(
-            "{:.4e} s first, growing by {} a step; implicit in pressure, stress and yield: no stability limit",
-            body.solver.timestep_scaled * unit,
-            body.solver.growth
-        ),
-    );
-    lines.say("cost", "well under a second per 1000 cells and 50 steps");
+    lines.say_march(&body.solver, (body.depth / body.gravity).sqrt());
     Ok(lines.0)
 }
 

@@ -34,7 +34,9 @@ pub mod open_chute;
 mod overlap_state;
 pub mod precheck;
 pub mod settle;
+pub mod sheared;
 mod silo;
+pub mod steady_layer;
 pub mod step;
 mod step_table;
 mod surface_fields;
@@ -249,6 +251,7 @@ pub fn check(scene: &Scene) -> Result<(), Failure> {
     match &scene.body {
         SceneBody::Incline(body) => precheck::incline(scene, body),
         SceneBody::Bagnold(body) => bagnold::check(scene, body),
+        SceneBody::Sheared(body) => sheared::check(scene, body),
         SceneBody::Impact(body) => impact::check(scene, body),
         SceneBody::Chute(body) => chute::check(scene, body),
         SceneBody::Settle(body) => settle::check(scene, body),
@@ -306,6 +309,7 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> {
                 InclineModel::Hybrid => joined_incline::run(body, &mut under),
             },
             SceneBody::Bagnold(body) => bagnold::run(body, &mut under),
+            SceneBody::Sheared(body) => sheared::run(body, &mut under),
             SceneBody::Impact(body) => impact::run(body, &mut under),
             SceneBody::Chute(body) => chute::run(body, &mut under),
             SceneBody::Settle(body) => settle::run(body, &mut under),

@@ -40,6 +40,7 @@ mod open_chute;
 mod overlap;
 mod overlap_width;
 mod settle;
+mod sheared;
 mod silo;
 mod tensile;
 mod tumbling_box;
@@ -83,6 +84,7 @@ pub use layer_case::{LayerCase, LayerVisitor};
 pub use open_chute::{InflowKeys, OpenChuteGrid, OpenChuteScene};
 pub use overlap::{InclineModel, NormalMotionKind, OverlapKeys};
 pub use settle::{SettleFloor, SettleGrains, SettleScene};
+pub use sheared::{ExactFlow, ShearedCase, ShearedScene};
 pub use silo::SiloScene;
 pub use tensile::{ClampKind, TensileScene};
 pub use tumbling_box::{Attitude, BedKeys, LanderKeys, TumblingBoxScene};
@@ -92,7 +94,7 @@ use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
 
 /// The names and texts of the bundled scenes.
-pub const BUNDLED: [(&str, &str); 23] = [
+pub const BUNDLED: [(&str, &str); 25] = [
     ("incline", include_str!("../scenes/incline.toml")),
     (
         "incline-moderate",
@@ -107,6 +109,11 @@ pub const BUNDLED: [(&str, &str); 23] = [
         include_str!("../scenes/incline-glass.toml"),
     ),
     ("bagnold", include_str!("../scenes/bagnold.toml")),
+    ("plane-shear", include_str!("../scenes/plane-shear.toml")),
+    (
+        "vertical-chute",
+        include_str!("../scenes/vertical-chute.toml"),
+    ),
     ("two-spheres", include_str!("../scenes/two-spheres.toml")),
     (
         "sphere-on-plane",
@@ -157,6 +164,8 @@ pub enum SceneBody {
     Incline(Box<InclineScene>),
     /// The μ(I) continuum on an incline.
     Bagnold(Box<BagnoldScene>),
+    /// The continuum between plates or walls, beside its exact solution.
+    Sheared(ShearedScene),
     /// One impact of two spheres, or of a sphere on a plane.
     Impact(Box<ImpactScene>),
     /// Grains on a rough chute, from a start file.
@@ -179,6 +188,7 @@ impl SceneBody {
         match self {
             SceneBody::Incline(scene) => toml::Table::try_from(scene),
             SceneBody::Bagnold(scene) => toml::Table::try_from(scene),
+            SceneBody::Sheared(scene) => scene.to_table(),
             SceneBody::Impact(scene) => toml::Table::try_from(scene),
             SceneBody::Chute(scene) => toml::Table::try_from(scene),
             SceneBody::Settle(scene) => toml::Table::try_from(scene),
@@ -269,7 +279,7 @@ impl Scene {
         // only the stiffness keys have defaults to drop.
         let kind = family(&name);
         let drops: &[&[&str]] = match kind {
-            Family::Bagnold | Family::Cylinder => &[],
+            Family::Bagnold | Family::Sheared | Family::Cylinder => &[],
             Family::Collapse => &law::CHOICES,
             Family::Incline => &INCLINE_CHOICES[..1],
             Family::OpenChute => &CHUTE_CHOICES[..1],
@@ -338,7 +348,11 @@ impl Scene {
         let of_incline = matches!(kind, Family::Incline) && table.contains_key("rheology");
         let of_continuum = matches!(
             kind,
-            Family::Bagnold | Family::Collapse | Family::Cylinder | Family::OpenChute
+            Family::Bagnold
+                | Family::Sheared
+                | Family::Collapse
+                | Family::Cylinder
+                | Family::OpenChute
         );
         if of_incline || of_continuum {
             // A bundled scene has the numbers of all laws, as defaults.
@@ -416,6 +430,7 @@ impl Scene {
         match &self.body {
             SceneBody::Incline(scene) => scene.check_together(origin),
             SceneBody::Bagnold(scene) => scene.check_together(origin),
+            SceneBody::Sheared(scene) => scene.check_together(origin),
             SceneBody::Impact(scene) => scene.check_together(origin),
             SceneBody::Chute(scene) => scene.check_together(origin),
             SceneBody::Settle(scene) => scene.check_together(origin),
@@ -464,6 +479,7 @@ fn body(name: &str, table: &toml::Table) -> Result<SceneBody, String> {
     Ok(match family(name) {
         Family::Incline => SceneBody::Incline(table.try_into().map_err(plain)?),
         Family::Bagnold => SceneBody::Bagnold(table.try_into().map_err(plain)?),
+        Family::Sheared => SceneBody::Sheared(ShearedScene::read(name, table).map_err(plain)?),
         Family::Impact => SceneBody::Impact(table.try_into().map_err(plain)?),
         Family::Chute => SceneBody::Chute(table.try_into().map_err(plain)?),
         Family::Settle => SceneBody::Settle(table.try_into().map_err(plain)?),
@@ -487,6 +503,7 @@ const LEAST_MASS: f64 = 1e-100;
 enum Family {
     Incline,
     Bagnold,
+    Sheared,
     Impact,
     Chute,
     Settle,
@@ -508,6 +525,7 @@ fn base_of(name: &str) -> &'static str {
 fn family(name: &str) -> Family {
     match name {
         "bagnold" => Family::Bagnold,
+        "plane-shear" | "vertical-chute" => Family::Sheared,
         "two-spheres" | "sphere-on-plane" => Family::Impact,
         "chute" => Family::Chute,
         "settle" => Family::Settle,
@@ -523,7 +541,7 @@ fn family(name: &str) -> Family {
 fn alternatives(name: &str) -> &'static [&'static [&'static str]] {
     match family(name) {
         Family::Incline => &INCLINE_CHOICES,
-        Family::Bagnold | Family::Cylinder => rheology_file::ALTERNATIVES,
+        Family::Bagnold | Family::Sheared | Family::Cylinder => rheology_file::ALTERNATIVES,
         Family::Collapse => &COLLAPSE_CHOICES,
         Family::OpenChute => &CHUTE_CHOICES,
         Family::Impact | Family::Grains => &law::CHOICES,
@@ -584,6 +602,7 @@ fn body_schema(name: &str) -> Value {
     let schema = match family(name) {
         Family::Incline => schemars::schema_for!(InclineScene),
         Family::Bagnold => schemars::schema_for!(BagnoldScene),
+        Family::Sheared => return ShearedScene::schema(name),
         Family::Impact => schemars::schema_for!(ImpactScene),
         Family::Chute => schemars::schema_for!(ChuteScene),
         Family::Settle => schemars::schema_for!(SettleScene),

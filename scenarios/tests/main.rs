@@ -27,5 +27,6 @@ mod open_chute;
 mod own_scenes;
 mod restart;
 mod scenes;
+mod sheared;
 mod tumbling_box;
 mod worlds;

@@ -234,16 +234,27 @@ impl Panels {
         }
     }
 
-    /// Without instructions of some processors, on one subtree.
+    /// Without instructions of some processors, or with those of AVX2 alone, on one subtree; false if the processor has none.
     #[cfg(test)]
-    pub(super) fn substitute_plainly(&mut self, x: &mut [f64]) {
+    pub(super) fn substitute_plainly(&mut self, x: &mut [f64], by_avx2: bool) -> bool {
         assert!(self.halves.is_none());
         for (y, &from) in self.memory.iter_mut().zip(&self.unknowns) {
             *y = x[from as usize];
         }
-        self.substitute_by::<Plain>(true);
-        self.substitute_by::<Plain>(false);
+        for is_up in [true, false] {
+            #[cfg(target_arch = "x86_64")]
+            if by_avx2 && std::arch::is_x86_feature_detected!("avx2") {
+                // SAFETY: the processor has been asked for AVX2.
+                unsafe { self.substitute_avx2(is_up) };
+                continue;
+            }
+            if by_avx2 {
+                return false;
+            }
+            self.substitute_by::<Plain>(is_up);
+        }
         self.hand_out(x);
+        true
     }
 
     fn on_processor(&mut self, is_up: bool) {

@@ -333,6 +333,9 @@ fn divide(
     let width = signs.len();
     if width == 1 {
         let sign = f64::from(signs[0]);
+        if !own[0].is_finite() {
+            return Err(Error::LinearSolver("a pivot is not finite".into()));
+        }
         if own[0] * sign <= SMALLEST_PIVOT {
             own[0] = sign * SMALLEST_PIVOT;
         }

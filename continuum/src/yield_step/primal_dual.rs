@@ -13,102 +13,34 @@
 //! their pressure keep the pressure that the step began with: friction is then given, and the step has a
 //! solution. [`StepReport::held_points`] counts them.
 
+mod descent;
 mod evaluation;
+mod linearised;
+mod options;
 mod part;
+mod residuals;
 
 use std::time::Instant;
 
-use serde::{Deserialize, Serialize};
+use serde::Serialize;
 
 use super::coefficients::StepMatrix;
 use super::conflict::Conflicts;
-use super::{
-    FlowState, Residuals, StepProblem, StepReport, YieldSolver, divergence_residual,
-    largest_or_nan, momentum_residual,
-};
+use super::{FlowState, Residuals, StepProblem, StepReport, YieldSolver};
 use crate::discretisation::{COMPONENTS, Discretisation};
 use crate::error::Error;
-use crate::rheology::{Rheology, squared_norm, strain_rate_norm};
+use crate::rheology::Rheology;
 use crate::threads;
-use evaluation::{Evaluation, POINTS};
+use evaluation::Evaluation;
+use linearised::LinearisedPoint;
+pub use options::{LinearSolver, PrimalDualOptions};
 use part::Outcome;
 
-/// Settings of [`PrimalDual`]; times and lengths in natural units.
-#[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
-#[serde(deny_unknown_fields, default)]
-pub struct PrimalDualOptions {
-    /// Strain-rate floor ε of the result, in √(g/H): rigid matter creeps at this rate. Below 1e-7
-    /// the round-off of γ in a moving plug dominates.
-    pub strain_rate_floor: f64,
-    /// ε of the first iteration from a cold start.
-    pub first_strain_rate_floor: f64,
-    /// Factor by which ε falls after each iteration.
-    pub floor_factor: f64,
-    /// Iterations after which an attempt is given up.
-    pub max_iterations: usize,
-    /// Tolerance of the momentum balance, as a fraction of g.
-    pub momentum_tolerance: f64,
-    /// Tolerance of the divergence, in √(g/H).
-    pub divergence_tolerance: f64,
-    /// Tolerance of the stress law, relative; raised to the round-off of γ/ε where that is larger.
-    /// A miss of this size shifts γ̇ by κ/κ_γ times as much, hundreds of times in slow flow.
-    pub stress_tolerance: f64,
-    /// Factor by which the tolerances of momentum and stress are raised at a speed of √(g H), and in
-    /// proportion below (never under 1).
-    pub tolerance_in_motion: f64,
-    /// Relative residual to which the linear system of an iteration is solved where it is solved
-    /// iteratively. A tighter one than the default saves no iteration; it leaves less of what the order of
-    /// elimination does to a flow that mirrors itself.
-    pub linear_tolerance: f64,
-    /// How the linear systems of flows along more than one axis are solved.
-    pub linear_solver: LinearSolver,
-    /// Whether pressure is one-sided: p ≥ 0 and ∇·u ≥ 0, one of them zero, so that matter that is
-    /// pulled apart falls freely instead of being held by suction.
-    pub one_sided_pressure: bool,
-}
-
-/// What preconditions the Krylov iteration on the linear system.
-#[derive(Debug, Clone, Copy, PartialEq, Eq, Default, Serialize, Deserialize)]
-#[serde(rename_all = "kebab-case")]
-pub enum LinearSolver {
-    /// LDLᵀ factors of the symmetric part.
-    #[default]
-    Factors,
-    /// A multigrid cycle; factors where the places of the unknowns are not known. In space it is cheaper from some
-    /// thousand cells on as long as most of the material flows; where much of it is rigid it needs several times
-    /// as many iterations.
-    Multigrid,
-}
-
-impl Default for PrimalDualOptions {
-    fn default() -> Self {
-        Self {
-            strain_rate_floor: 1e-6,
-            first_strain_rate_floor: 0.3,
-            floor_factor: 0.1,
-            max_iterations: 40,
-            momentum_tolerance: 1e-9,
-            divergence_tolerance: 1e-9,
-            stress_tolerance: 1e-8,
-            tolerance_in_motion: 1.0,
-            linear_tolerance: NEWTON_TOLERANCE,
-            linear_solver: LinearSolver::Factors,
-            one_sided_pressure: false,
-        }
-    }
-}
-
-/// Smallest ε with which the stress law can be met in double precision.
-const SMALLEST_STRAIN_RATE_FLOOR: f64 = 1e-7;
 /// Most times that thresholds next to cells in conflict are held and the step is tried again.
 const MOST_HELD_ROUNDS: usize = 4;
 /// Iterations after which a start from the previous stress at the final ε is given up in favour of
 /// a cold start.
 const WARM_ITERATIONS: usize = 20;
-
-/// Relative residual to which the linear system of a Newton iteration is solved when it is solved
-/// iteratively: a tighter one saves no iteration.
-const NEWTON_TOLERANCE: f64 = 1e-3;
 
 /// Residual of the first linear system of an attempt in a plane, over [`PrimalDualOptions::linear_tolerance`]: what the law
 /// bends by leaves more.
@@ -125,49 +57,6 @@ const PROGRESS: f64 = 0.5;
 
 /// Most parts that are solved between two iterations of the whole: what is left of one lies beside it.
 const MOST_PARTS: usize = 4;
-
-/// The law linearised at one quadrature point.
-#[derive(Debug, Clone, Copy)]
-struct LinearisedPoint<const C: usize> {
-    /// κ γ/√(|γ|² + ε²): the stress that the law asks for now.
-    stress: [f64; C],
-    /// ∂s/∂γ as the stress update uses it.
-    by_rate: [[f64; C]; C],
-    /// ∂s/∂p.
-    by_pressure: [f64; C],
-}
-
-impl<const C: usize> Default for LinearisedPoint<C> {
-    fn default() -> Self {
-        Self {
-            stress: [0.0; C],
-            by_rate: [[0.0; C]; C],
-            by_pressure: [0.0; C],
-        }
-    }
-}
-
-impl<const C: usize> LinearisedPoint<C> {
-    fn set(&mut self, evaluation: &Evaluation<C>, s: &[f64; C]) {
-        let Evaluation {
-            gamma,
-            rate,
-            threshold,
-            ..
-        } = evaluation;
-        let viscosity = threshold.stress / rate;
-        let inverse_square = 1.0 / (rate * rate);
-        for a in 0..C {
-            self.stress[a] = viscosity * gamma[a];
-            self.by_pressure[a] = threshold.by_pressure * gamma[a] / rate;
-            for b in 0..C {
-                self.by_rate[a][b] =
-                    (threshold.by_rate * gamma[a] - s[a]) * gamma[b] * inverse_square;
-            }
-            self.by_rate[a][a] += viscosity;
-        }
-    }
-}
 
 /// How an attempt begins and descends.
 struct Strategy {
@@ -243,28 +132,7 @@ impl<const C: usize> PrimalDual<C> {
         discretisation: &Discretisation<D, C, V>,
         options: PrimalDualOptions,
     ) -> Result<Self, Error> {
-        crate::error::require(
-            options.strain_rate_floor >= SMALLEST_STRAIN_RATE_FLOOR
-                && options.strain_rate_floor <= options.first_strain_rate_floor,
-            "solver.strain_rate_floor",
-            options.strain_rate_floor,
-            format!(
-                "{SMALLEST_STRAIN_RATE_FLOOR:e} to solver.first_strain_rate_floor = {}",
-                options.first_strain_rate_floor
-            ),
-        )?;
-        crate::error::require(
-            options.floor_factor > 0.0 && options.floor_factor < 1.0,
-            "solver.floor_factor",
-            options.floor_factor,
-            "between 0 and 1, both excluded",
-        )?;
-        crate::error::require(
-            options.linear_tolerance > 0.0 && options.linear_tolerance < 1.0,
-            "solver.linear_tolerance",
-            options.linear_tolerance,
-            "between 0 and 1, both excluded",
-        )?;
+        options.validate()?;
         let velocities = discretisation.velocities();
         let cells = discretisation.cells();
         let pays = velocities + cells >= threads::MANY;
@@ -449,311 +317,6 @@ impl<const C: usize> PrimalDual<C> {
             .min(LOOSEST * least)
             .min(WEAKEST)
     }
-
-    /// ∂s/∂γ = κ/γ_ε 1 + (κ_γ γ − s) ⊗ γ/γ_ε² and ∂s/∂p = κ_p γ/γ_ε, with γ_ε = √(|γ|² + ε²).
-    fn linearise<R: Rheology, const D: usize, const V: usize>(
-        &mut self,
-        problem: &StepProblem<'_, R, D, C, V>,
-        floor: f64,
-    ) {
-        self.evaluate(problem, floor);
-        let (evaluations, stresses) = (&self.evaluations, &self.trial.s);
-        threads::over(&mut self.points, POINTS, &|first, points| {
-            let states = evaluations[first..].iter().zip(&stresses[first..]);
-            for (linear, (evaluation, s)) in points.iter_mut().zip(states) {
-                linear.set(evaluation, s);
-            }
-        });
-        for (q, evaluation) in self.evaluations.iter().enumerate() {
-            self.conflicts.note_point(q, evaluation.is_pressed);
-        }
-    }
-
-    /// Fills the matrix, with ∂s/∂γ symmetrised (positive definite while |s| ≤ κ), and the
-    /// right-hand side.
-    fn assemble<R: Rheology, const D: usize, const V: usize>(
-        &mut self,
-        problem: &StepProblem<'_, R, D, C, V>,
-        u_old: &[f64],
-    ) {
-        let discretisation = problem.discretisation;
-        let (linear, trial, released) = (&self.points, &self.trial, &self.released);
-        let (matrix, right_hand_side) = (&mut self.matrix, &mut self.right_hand_side);
-        threads::join(
-            linear.len() >= threads::WORTH_HALVING * POINTS,
-            || {
-                matrix.fill(discretisation, problem.dt, released, |q| {
-                    let by_rate = &linear[q].by_rate;
-                    let c = std::array::from_fn(|a| {
-                        std::array::from_fn(|b| 0.5 * (by_rate[a][b] + by_rate[b][a]))
-                    });
-                    (c, linear[q].by_pressure)
-                });
-            },
-            || {
-                let velocities = discretisation.velocities();
-                let (momentum, continuity) = right_hand_side.split_at_mut(velocities);
-                let mass = discretisation.mass();
-                for (j, r) in momentum.iter_mut().enumerate() {
-                    *r = problem.load[j] - mass[j] * (trial.u[j] - u_old[j]) / problem.dt;
-                }
-                for (point, linear) in discretisation.points().iter().zip(linear) {
-                    for (slot, &j) in point.velocities().iter().enumerate() {
-                        momentum[j] -= point.weight * point.force(slot, &linear.stress);
-                    }
-                }
-                let forces = discretisation
-                    .divergence()
-                    .iter()
-                    .zip(discretisation.gradient());
-                for (&(cell, j, _), force) in forces {
-                    momentum[j] += force * trial.p[cell];
-                }
-                let volume = discretisation.grid().cell_volume();
-                for ((r, p), _) in continuity
-                    .iter_mut()
-                    .zip(&trial.p)
-                    .zip(released)
-                    .filter(|(_, released)| **released)
-                {
-                    *r = volume * p;
-                }
-            },
-        );
-    }
-
-    /// Decides which cells let go: those that would have to be pulled together to keep their
-    /// volume (p ≥ 0 and ∇·u ≥ 0 complement each other). Fills the continuity part of the
-    /// right-hand side.
-    /// The first iteration goes by the pressure alone, because the velocity that a step begins with
-    /// has a divergence of its own. A pressure that has come out negative decides by itself, too: the
-    /// divergence beside it is zero but for what the linear solution misses by.
-    fn release<const D: usize, const V: usize>(
-        &mut self,
-        discretisation: &Discretisation<D, C, V>,
-        is_first: bool,
-    ) {
-        let continuity = &mut self.right_hand_side[self.trial.u.len()..];
-        divergence_residual(discretisation, &self.trial.u, continuity);
-        if self.options.one_sided_pressure {
-            let volume = discretisation.grid().cell_volume();
-            let cells = self.trial.p.iter().zip(continuity).zip(&self.cut);
-            for (released, ((p, d), cut)) in self.released.iter_mut().zip(cells) {
-                *released = if is_first {
-                    *p <= 0.0
-                } else {
-                    *cut || p - *d / volume <= 0.0
-                };
-            }
-            self.conflicts.note_cells(&self.released);
-        }
-    }
-
-    /// Largest fraction 1, ½, ¼, ⅛ of the change of velocity with which the convex functional of
-    /// the step at the new pressure does not grow.
-    fn line_search<R: Rheology, const D: usize, const V: usize>(
-        &mut self,
-        problem: &StepProblem<'_, R, D, C, V>,
-        u_old: &[f64],
-        floor: f64,
-    ) -> f64 {
-        let (du, dp) = self.change.split_at(self.trial.u.len());
-        let pressure = &mut self.candidate_pressure;
-        for ((c, p), d) in pressure.iter_mut().zip(&self.trial.p).zip(dp) {
-            *c = p + d;
-        }
-        let held = &self.conflicts;
-        let start = functional(problem, u_old, &self.trial.u, pressure, held, floor);
-        let mut fraction = 1.0;
-        while fraction > 0.125 {
-            for ((c, u), d) in self.candidate.iter_mut().zip(&self.trial.u).zip(du) {
-                *c = u + fraction * d;
-            }
-            let value = functional(problem, u_old, &self.candidate, pressure, held, floor);
-            if value <= start + 1e-12 * start.abs() {
-                break;
-            }
-            fraction *= 0.5;
-        }
-        fraction
-    }
-
-    /// Adds the change, and brings stresses that ended above the threshold back onto it.
-    fn update<R: Rheology, const D: usize, const V: usize>(
-        &mut self,
-        problem: &StepProblem<'_, R, D, C, V>,
-        floor: f64,
-        fraction: f64,
-    ) {
-        let (du, dp) = self.change.split_at(self.trial.u.len());
-        let points = problem.discretisation.points();
-        let linear = &self.points;
-        threads::over(&mut self.trial.s, POINTS, &|first, stresses| {
-            let points = points[first..].iter().zip(&linear[first..]);
-            for ((point, linear), s) in points.zip(stresses) {
-                let rate = point.strain_rate_change(du);
-                let pressure = point.pressure_change(dp);
-                for (a, s) in s.iter_mut().enumerate() {
-                    let mut target = linear.stress[a];
-                    for (by_rate, rate) in linear.by_rate[a].iter().zip(&rate) {
-                        target += by_rate * rate;
-                    }
-                    target += linear.by_pressure[a] * pressure;
-                    *s += fraction * (target - *s);
-                }
-            }
-        });
-        for (u, d) in self.trial.u.iter_mut().zip(du) {
-            *u += fraction * d;
-        }
-        for (p, d) in self.trial.p.iter_mut().zip(dp) {
-            *p += d;
-        }
-        if self.options.one_sided_pressure {
-            let cells = self.trial.p.iter_mut().zip(&mut self.cut);
-            for ((p, cut), released) in cells.zip(&self.released) {
-                *cut = *p < 0.0 && !released;
-                *p = p.max(0.0);
-            }
-        }
-        self.evaluated_at = f64::NAN;
-        self.evaluate(problem, floor);
-        self.bring_stress_to_threshold();
-    }
-
-    /// Brings stresses above the threshold of the evaluated state back onto it: beyond, ∂s/∂γ is not positive.
-    fn bring_stress_to_threshold(&mut self) {
-        for (evaluation, s) in self.evaluations.iter().zip(&mut self.trial.s) {
-            let threshold = evaluation.threshold;
-            let size = strain_rate_norm(*s);
-            if size > threshold.stress {
-                let shrink = threshold.stress / size;
-                s.iter_mut().for_each(|s| *s *= shrink);
-            }
-        }
-    }
-
-    /// All residuals of the trial state; overwrites the right-hand side.
-    fn residuals<R: Rheology, const D: usize, const V: usize>(
-        &mut self,
-        problem: &StepProblem<'_, R, D, C, V>,
-        u_old: &[f64],
-        floor: f64,
-    ) -> Residuals {
-        let divergence = self.continuity_residual(problem.discretisation);
-        self.evaluate(problem, floor);
-        let momentum = &mut self.right_hand_side[..self.trial.u.len()];
-        let (evaluations, trial, misses) = (&self.evaluations, &self.trial, &mut self.misses);
-        let (momentum, stress) = threads::join(
-            evaluations.len() >= threads::WORTH_HALVING * POINTS,
-            || momentum_residual(problem, u_old, trial, momentum),
-            || {
-                let mut stress = 0.0;
-                let states = evaluations.iter().zip(&trial.s);
-                for ((evaluation, s), kept) in states.zip(misses) {
-                    *kept = evaluation.miss(s);
-                    stress = largest_or_nan(stress, *kept);
-                }
-                stress
-            },
-        );
-        Residuals {
-            momentum,
-            divergence,
-            stress,
-            strain_rate_floor: floor,
-        }
-    }
-
-    /// Largest |∇·u|, or largest miss of p ≥ 0 ⟂ ∇·u ≥ 0.
-    fn continuity_residual<const D: usize, const V: usize>(
-        &mut self,
-        discretisation: &Discretisation<D, C, V>,
-    ) -> f64 {
-        let continuity = &mut self.right_hand_side[self.trial.u.len()..];
-        let divergence = divergence_residual(discretisation, &self.trial.u, continuity);
-        if !self.options.one_sided_pressure {
-            return divergence;
-        }
-        let volume = discretisation.grid().cell_volume();
-        self.trial
-            .p
-            .iter()
-            .zip(continuity)
-            .fold(0.0, |largest, (p, d)| {
-                let d = *d / volume;
-                largest_or_nan(largest, if p - d <= 0.0 { *p } else { d })
-            })
-    }
-
-    /// What the residuals of a step may be, by how fast it moves.
-    fn tolerances<R, const D: usize, const V: usize>(
-        &self,
-        problem: &StepProblem<'_, R, D, C, V>,
-    ) -> Residuals {
-        let axes = problem.discretisation.grid().axes();
-        let spacing = axes
-            .iter()
-            .filter(|axis| **axis != crate::grid::Axis::Flat)
-            .fold(f64::INFINITY, |h, axis| h.min(axis.spacing()));
-        let speed = self.trial.u.iter().fold(0.0_f64, |m, u| m.max(u.abs()));
-        // Digits of γ that a large common velocity costs.
-        let round_off = 10.0 * f64::EPSILON * speed / spacing;
-        let options = &self.options;
-        let motion = (options.tolerance_in_motion * speed.min(1.0)).max(1.0);
-        Residuals {
-            momentum: motion * options.momentum_tolerance,
-            divergence: options.divergence_tolerance.max(round_off),
-            stress: (motion * options.stress_tolerance).max(round_off / options.strain_rate_floor),
-            strain_rate_floor: options.strain_rate_floor,
-        }
-    }
-}
-
-impl Residuals {
-    /// The larger of momentum and stress over what is allowed.
-    fn over(&self, allowed: &Self) -> f64 {
-        (self.momentum / allowed.momentum).max(self.stress / allowed.stress)
-    }
-
-    /// Whether none is larger than allowed.
-    fn are_within(&self, allowed: &Self) -> bool {
-        self.momentum <= allowed.momentum
-            && self.divergence <= allowed.divergence
-            && self.stress <= allowed.stress
-    }
-}
-
-/// J(u) = ½ (u − u*)ᵀ M (u − u*)/Δt + Σ W Ψ(γ_ε, p) − F·u: convex in u, least at the solution of
-/// the step among velocities without divergence.
-fn functional<R: Rheology, const D: usize, const C: usize, const V: usize>(
-    problem: &StepProblem<'_, R, D, C, V>,
-    u_old: &[f64],
-    u: &[f64],
-    p: &[f64],
-    conflicts: &Conflicts,
-    floor: f64,
-) -> f64 {
-    let mass = problem.discretisation.mass();
-    let kinetic: f64 = (0..u.len())
-        .map(|j| {
-            let change = u[j] - u_old[j];
-            0.5 * mass[j] * change * change / problem.dt - problem.load[j] * u[j]
-        })
-        .sum();
-    let dissipated: f64 = problem
-        .discretisation
-        .points()
-        .iter()
-        .enumerate()
-        .map(|(q, point)| {
-            let gamma = point.strain_rate(u);
-            let rate = (squared_norm(&gamma) + floor * floor).sqrt();
-            let (pressure, _) = conflicts.pressure(q, point, p);
-            point.weight * point.law.potential(problem.rheology, rate, pressure)
-        })
-        .sum();
-    kinetic + dissipated
 }
 
 impl<R: Rheology, const D: usize, const C: usize, const V: usize> YieldSolver<R, D, C, V>

@@ -3,7 +3,7 @@
 use crate::failure::Failure;
 use crate::interruption;
 use crate::report::calibration::{Comparison, FrictionOf};
-use crate::run::bagnold;
+use crate::run::steady_layer;
 use crate::run_directory::RunDirectory;
 use crate::scene::{InclineScene, Scene, SceneBody};
 use colluvium_continuum::bagnold::BagnoldCase;
@@ -96,7 +96,7 @@ fn used(point: &LocalPoint, run: &InclineResult) -> bool {
 /// The solver's settings of the bundled continuum scene.
 fn solver() -> Result<Options, Failure> {
     match Scene::load("bagnold", &[])?.body {
-        SceneBody::Bagnold(layer) => Ok(bagnold::options(&layer)),
+        SceneBody::Bagnold(layer) => Ok(steady_layer::options(&layer.solver)),
         _ => Ok(Options::default()),
     }
 }

@@ -58,7 +58,7 @@ pub fn errors(scene: &Scene, run: &Path, reference: &Path) -> Result<Errors, Fai
             (name.to_owned(), curve(run, reference, [file, z, column]))
         })
         .to_vec(),
-        SceneBody::Incline(_) | SceneBody::Bagnold(_) => {
+        SceneBody::Incline(_) | SceneBody::Bagnold(_) | SceneBody::Sheared(_) => {
             vec![("velocity".to_owned(), curve(run, reference, PROFILE))]
         }
     })

@@ -192,7 +192,7 @@ fn trajectory(table: &Table) -> Markup {
 }
 
 fn layer(profile: &Table, history: Option<&Table>) -> Markup {
-    let velocity = Plot::new("velocity u [m/s]", "height z [m]")
+    let velocity = Plot::new("velocity u [m/s]", "distance z across the layer [m]")
         .with("exact", Mark::Dashes, 6, profile.pairs("u_exact", "z"))
         .with("computed", Mark::Dots, 0, profile.pairs("u", "z"));
     let error: Vec<(f64, f64)> = profile
@@ -202,11 +202,16 @@ fn layer(profile: &Table, history: Option<&Table>) -> Markup {
         .zip(profile.column("z"))
         .map(|((u, exact), z)| (u - exact, *z))
         .collect();
-    let error = Plot::new("u − u exact [m/s]", "height z [m]").with("", Mark::Line, 1, error);
+    let error = Plot::new("u − u exact [m/s]", "distance z across the layer [m]").with(
+        "",
+        Mark::Line,
+        1,
+        error,
+    );
     html! {
         h2 { "Profile" }
         div.figures {
-            (figure(&velocity.svg(WIDTH, HEIGHT), "Velocity through the depth, beside the exact Bagnold profile."))
+            (figure(&velocity.svg(WIDTH, HEIGHT), "Velocity across the layer, beside the exact solution."))
             (figure(&error.svg(WIDTH, HEIGHT), "What is left between them."))
             @if let Some(history) = history {
                 @let plot = Plot::new("time t [s]", "mean velocity [m/s]")

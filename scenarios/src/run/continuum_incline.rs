@@ -1,8 +1,8 @@
 //! The layer of an incline as continuum alone: the same mass, the same start and the same time as of the grains.
 
-use super::bagnold::failure;
 use super::joined_incline::{self, findings, keys};
 use super::precheck::stand_in_bed;
+use super::steady_layer::failure;
 use super::step_table::StepTable;
 use super::{Findings, Under, incline};
 use crate::cost::Cost;

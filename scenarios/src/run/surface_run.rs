@@ -1,7 +1,7 @@
 //! A run of a flow with a moving surface: its steps up to the end, with rows, profiles, fields and checkpoints.
 
 use super::Under;
-use super::bagnold::failure;
+use super::steady_layer::failure;
 use super::surface_steps::{FRONTS, PROFILES, Steps, columns, join_pictures, put_state, state_of};
 use crate::cost::Cost;
 use crate::failure::Failure;

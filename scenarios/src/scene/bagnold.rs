@@ -151,10 +151,10 @@ impl RheologyKeys {
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
 #[serde(deny_unknown_fields)]
 pub struct BagnoldGrid {
-    /// Cells across the depth at scale 1.
+    /// Cells across the layer at scale 1.
     #[schemars(extend("minimum" = 4, "maximum" = 4096))]
     pub cells: u64,
-    /// Cells downslope; 1 stores no downslope axis.
+    /// Cells along the flow; 1 stores no axis along it.
     #[schemars(extend("minimum" = 1, "maximum" = 256))]
     pub columns: u64,
 }
@@ -165,13 +165,13 @@ pub struct BagnoldGrid {
 pub struct SolverKeys {
     /// How yield is treated.
     pub method: SolverMethod,
-    /// First time step over √(depth/gravity).
+    /// First time step over the natural time: √(depth/gravity) on an incline, breadth √(ρ/load) between plates or walls.
     #[schemars(extend("minimum" = 1.0e-6, "maximum" = 1.0e10))]
     pub timestep_scaled: f64,
     /// Factor by which the time step grows from step to step.
     #[schemars(extend("minimum" = 1.0, "maximum" = 1.0e6))]
     pub growth: f64,
-    /// Steady when the largest acceleration over gravity falls below this.
+    /// Steady when the largest acceleration falls below this, over gravity, or between plates or walls over load/(ρ breadth).
     #[schemars(extend("minimum" = 1.0e-14, "maximum" = 1.0e-2))]
     pub steady_tolerance: f64,
     /// Most time steps.
@@ -192,59 +192,82 @@ pub enum SolverMethod {
 /// Most cells of a grid: their matrix has to fit into the memory of one machine.
 const LARGEST_GRID: u64 = 200_000;
 
+impl BagnoldGrid {
+    /// Cells across the layer at a scale.
+    pub fn cells_at(&self, scale: f64) -> usize {
+        (self.cells as f64 * scale).round().max(4.0) as usize
+    }
+
+    /// Columns of a periodic grid; none where nothing varies along the flow.
+    pub fn columns(&self) -> Option<usize> {
+        (self.columns > 1).then_some(self.columns as usize)
+    }
+}
+
+/// Refuses grids that make no sense or are too large.
+pub(super) fn check_grid(grid: &BagnoldGrid, scale: f64, origin: &str) -> Result<(), SceneError> {
+    if grid.columns == 2 {
+        return Err(SceneError::OutOfRange {
+            file: origin.to_owned(),
+            key: "grid.columns".into(),
+            value: "2".into(),
+            range: "1, or 3 to 256".into(),
+        });
+    }
+    let across = grid.cells_at(scale) as u64;
+    if across * grid.columns > LARGEST_GRID {
+        let (key, value) = if grid.columns > across {
+            ("grid.columns", grid.columns)
+        } else {
+            ("grid.cells", grid.cells)
+        };
+        return Err(SceneError::OutOfRange {
+            file: origin.to_owned(),
+            key: key.into(),
+            value: value.to_string(),
+            range: format!(
+                "at most {LARGEST_GRID} for grid.cells x grid.columns x scale, here {} x {} x {scale}",
+                grid.cells, grid.columns
+            ),
+        });
+    }
+    Ok(())
+}
+
+/// Refuses numbers of a law that contradict each other.
+pub(super) fn check_law(r: &RheologyKeys, origin: &str) -> Result<(), SceneError> {
+    if let Some([low, high]) = r.valid_i.as_deref()
+        && low >= high
+    {
+        return Err(SceneError::OutOfRange {
+            file: origin.to_owned(),
+            key: "rheology.valid_i".into(),
+            value: format!("[{low}, {high}]"),
+            range: "[low, high] with low < high".into(),
+        });
+    }
+    if let (Some(mu_s), Some(mu_2)) = (r.mu_s, r.mu_2)
+        && mu_2 < mu_s
+    {
+        return Err(SceneError::OutOfRange {
+            file: origin.to_owned(),
+            key: "rheology.mu_2".into(),
+            value: mu_2.to_string(),
+            range: format!("at least rheology.mu_s = {mu_s}"),
+        });
+    }
+    Ok(())
+}
+
 impl BagnoldScene {
     /// Cells across the depth at this scale.
     pub fn cells(&self) -> usize {
-        (self.grid.cells as f64 * self.scale).round().max(4.0) as usize
+        self.grid.cells_at(self.scale)
     }
 
     pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {
-        if self.grid.columns == 2 {
-            return Err(SceneError::OutOfRange {
-                file: origin.to_owned(),
-                key: "grid.columns".into(),
-                value: "2".into(),
-                range: "1, or 3 to 256".into(),
-            });
-        }
-        let cells = self.cells() as u64 * self.grid.columns;
-        if cells > LARGEST_GRID {
-            let (key, value) = if self.grid.columns > self.cells() as u64 {
-                ("grid.columns", self.grid.columns)
-            } else {
-                ("grid.cells", self.grid.cells)
-            };
-            return Err(SceneError::OutOfRange {
-                file: origin.to_owned(),
-                key: key.into(),
-                value: value.to_string(),
-                range: format!(
-                    "at most {LARGEST_GRID} for grid.cells x grid.columns x scale, here {} x {} x {}",
-                    self.grid.cells, self.grid.columns, self.scale
-                ),
-            });
-        }
-        let r = &self.rheology;
-        if let Some([low, high]) = r.valid_i.as_deref()
-            && low >= high
-        {
-            return Err(SceneError::OutOfRange {
-                file: origin.to_owned(),
-                key: "rheology.valid_i".into(),
-                value: format!("[{low}, {high}]"),
-                range: "[low, high] with low < high".into(),
-            });
-        }
-        if let (Some(mu_s), Some(mu_2)) = (r.mu_s, r.mu_2)
-            && mu_2 < mu_s
-        {
-            return Err(SceneError::OutOfRange {
-                file: origin.to_owned(),
-                key: "rheology.mu_2".into(),
-                value: mu_2.to_string(),
-                range: format!("at least rheology.mu_s = {mu_s}"),
-            });
-        }
+        check_grid(&self.grid, self.scale, origin)?;
+        check_law(&self.rheology, origin)?;
         // The same checks as the solver's, with the scene's name in front.
         LayerCase::of(self)
             .and_then(|layer| layer.validate())

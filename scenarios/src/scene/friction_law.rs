@@ -31,6 +31,18 @@ impl RheologyKeys {
         })
     }
 
+    /// The inertial numbers between which the law was measured, if the scene or a table says so.
+    pub fn valid_inertial_numbers(&self) -> Option<[f64; 2]> {
+        match self.valid_i.as_deref() {
+            Some(&[low, high]) => Some([low, high]),
+            _ if self.law == FrictionLaw::Table => {
+                let table = self.friction_table().ok()?;
+                Some(table.valid_inertial_numbers())
+            }
+            _ => None,
+        }
+    }
+
     /// μ(I) with these numbers.
     pub fn mu_i(&self) -> MuI {
         MuI {

@@ -107,14 +107,6 @@ impl LayerCase {
     pub fn base_pressure(&self) -> f64 {
         of_any_law!(self, case => case.exact_pressure(0.0))
     }
-
-    /// The inertial numbers between which the law was measured, if it says so itself.
-    pub fn valid_inertial_numbers(&self) -> Option<[f64; 2]> {
-        match self {
-            LayerCase::Table(case) => Some(case.rheology.valid_inertial_numbers()),
-            _ => None,
-        }
-    }
 }
 
 fn layer<L: ShearLaw>(scene: &BagnoldScene, rheology: L) -> BagnoldCase<L> {
@@ -124,6 +116,6 @@ fn layer<L: ShearLaw>(scene: &BagnoldScene, rheology: L) -> BagnoldCase<L> {
         gravity: scene.gravity,
         rheology,
         cells: scene.cells(),
-        columns: (scene.grid.columns > 1).then_some(scene.grid.columns as usize),
+        columns: scene.grid.columns(),
     }
 }

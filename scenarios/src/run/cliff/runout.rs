@@ -3,8 +3,8 @@
 //! The ground is what is left of the cliff, cut along its crack, the wall below it and what lies before it: a plane or land.
 
 use crate::failure::Failure;
-use crate::run::bagnold::failure;
 use crate::run::land::Land;
+use crate::run::steady_layer::failure;
 use crate::run::surface_fields::SurfaceFields;
 use crate::scene::CliffScene;
 use crate::vtkhdf::{Cells, Frame};

@@ -2,8 +2,8 @@
 
 use crate::failure::Failure;
 use crate::rheology_file::RheologyFile;
-use crate::run::bagnold::failure;
 use crate::run::heap::{apart, edge, height_at};
+use crate::run::steady_layer::failure;
 use crate::scene::GrainCylinderScene;
 use crate::summary::{Figure, Quantity, Summary};
 use crate::table::Table;
