@@ -1,4 +1,5 @@
 //! Ponds at rest over slopes that cut the cells: where the level surface meets the ground the pressure is ρ g times the depth.
+use colluvium_continuum::column_collapse::{Collapse, CollapseCase, CollapseGround};
 use colluvium_continuum::free_surface::{Contact, SpaceFlow, SurfaceFlow, SurfaceOptions, Terrain};
 use colluvium_continuum::grid::{Axis, Boundary, Grid};
 use colluvium_continuum::rheology::MuI;
@@ -202,5 +203,41 @@ fn pressure_at_shores_in_space() {
         println!("{slope:?} {level}: {found:?}");
         let [miss, relative, speed] = found;
         assert!(relative < 1e-9 && miss < 1e-9 && speed < 1e-6 * DIAMETER.sqrt());
+    }
+}
+
+/// A column that collapses over a step down, down a slope and up one: what the shore's plane does not fit is left alone, so steps
+/// are solved up to rest, and the fronts are those under planes of matter and ground together, to a hundredth.
+#[test]
+fn collapses_over_steps_and_slopes_come_to_rest() {
+    let case = CollapseCase {
+        overhang_degrees: 0.0,
+        aspect: 0.5,
+        height: 1.0,
+        gravity: 1.0,
+        rheology: MuI::new(0.32, 0.60, 0.4, 1.0 / 30.0, 1.0, 1.0),
+        cells: 64,
+        length_scaled: 5.0,
+    };
+    for (points, expected) in [
+        (vec![[0.0, 2.0], [3.1, 2.0], [3.1, 1.5], [6.0, 1.5]], 4.961),
+        (vec![[0.0, 0.0], [3.1, 0.0], [20.0, -3.0]], 4.325),
+        (vec![[0.0, 0.0], [3.1, 0.0], [20.0, 5.0]], 3.615),
+    ] {
+        let ground = CollapseGround {
+            profile: Profile::new(points).unwrap(),
+            contact: Contact::NoSlip,
+        };
+        let options = SurfaceOptions::default();
+        let mut collapse = Collapse::over_ground(&case, &options, &ground, None).unwrap();
+        while collapse.time() < 11.99 {
+            let step = collapse.step(12.0).unwrap();
+            if collapse.is_at_rest(&step) {
+                break;
+            }
+        }
+        let front = collapse.front(0.01).position;
+        println!("{}: {front} {expected}", collapse.time());
+        assert!((front / expected - 1.0).abs() < 0.01, "{front} {expected}");
     }
 }

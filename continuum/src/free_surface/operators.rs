@@ -169,9 +169,13 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
     /// What lies beyond the surface of an active cell on the way to its inactive neighbour along an axis.
     pub(super) fn beyond(&self, active: usize, other: usize, axis: usize, side: usize) -> Beyond {
         if self.faces.shares.is_some() {
+            let [here, there] = [active, other].map(|cell| match self.planes[cell] {
+                Some(_) => self.shores.at(cell).map_or(0.0, |shore| shore.weight),
+                None => 1.0,
+            });
             let [inner, outer] = self.depths_of_centres(active, other, axis, side);
-            if inner > 0.0 && outer >= 0.0 {
-                return Beyond::Shore((outer / inner).min(1.0));
+            if inner > 0.0 && outer >= 0.0 && here.min(there) > 0.0 {
+                return Beyond::Shore(here.min(there) * (outer / inner).min(1.0));
             }
         }
         Beyond::Air(self.surface_distance(active, other, axis, side))
@@ -644,7 +648,8 @@ pub(super) enum Beyond {
     /// The surface at the distance θ, in cells.
     Air(f64),
     /// The shore. Ground takes up so much of the cell beyond that it is not active though its centre lies below the surface: the
-    /// pressure there over that in the active cell, as their depths.
+    /// pressure there over that in the active cell, as their depths, where planes fit. (Taken from planes that do not, it
+    /// may leave the pressure of a cell nothing to push, and the step no solution.)
     Shore(f64),
 }
 

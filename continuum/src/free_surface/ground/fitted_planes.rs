@@ -16,6 +16,8 @@ const STEPS: usize = 60;
 const SAME: f64 = 1e-15;
 /// Most planes to begin with: the cell itself, those beside it.
 const MOST_CANDIDATES: usize = 7;
+/// Planes that miss by more, in squares of cells, are too far off to begin with.
+const FAR: f64 = 1e-2;
 /// Turns of a plane towards the least miss.
 const TURNS: usize = 8;
 /// Angle over which the change of volumes with a turn is taken.
@@ -23,7 +25,7 @@ const SMALL_ANGLE: f64 = 1e-6;
 /// Largest turn at once.
 const LARGEST_TURN: f64 = FRAC_PI_6;
 /// A turn that leaves more than this part of a miss is the last one.
-const SETTLED: f64 = 0.99;
+const SETTLED: f64 = 0.5;
 /// Smallest square of the change of volumes, in cells, with an angle by which a plane is determined.
 const DETERMINED: f64 = 1e-4;
 
@@ -31,14 +33,14 @@ const DETERMINED: f64 = 1e-4;
 type Misses = ([f64; STENCIL], f64);
 
 impl<const D: usize> Ground<D> {
-    /// The plane that misses the matter around a cell least, from the best one of those normals, and the sum of the squares of
-    /// its misses; none where the neighbours do not tell.
+    /// The plane that misses the matter around a cell least, from the best one of those at hand, and the sum of the squares of
+    /// its misses; none where the neighbours do not tell, or none at hand comes near.
     pub(super) fn fitted_plane(
         &self,
         around: &Neighbourhood<'_, D>,
-        normals: impl Iterator<Item = [f64; 3]>,
+        at_hand: impl Iterator<Item = Plane>,
     ) -> Option<(Plane, f64)> {
-        let mut plane = self.best_plane(around, normals)?;
+        let mut plane = self.best_plane(around, at_hand)?;
         let mut misses = self.misses(around, &plane);
         for _ in 0..TURNS {
             if misses.1 <= EXACT {
@@ -101,16 +103,16 @@ impl<const D: usize> Ground<D> {
         }))
     }
 
-    /// The plane of those normals that misses the matter around a cell least; in space the mean of those as good.
+    /// The plane of the direction of that one which misses the matter around a cell least; in space the mean of those as
+    /// good.
     fn best_plane(
         &self,
         around: &Neighbourhood<'_, D>,
-        normals: impl Iterator<Item = [f64; 3]>,
+        at_hand: impl Iterator<Item = Plane>,
     ) -> Option<Plane> {
         let mut found: [Option<(Plane, f64)>; MOST_CANDIDATES] = [None; MOST_CANDIDATES];
-        let mut least = f64::INFINITY;
-        for (slot, normal) in found.iter_mut().zip(normals) {
-            let plane = self.holding(around.cell(), normal, around.fraction());
+        let mut least = FAR;
+        for (slot, plane) in found.iter_mut().zip(at_hand) {
             let miss = self.miss(around, &plane, (1.0 + ALIKE) * least + EXACT);
             least = least.min(miss);
             *slot = Some((plane, miss));
@@ -118,7 +120,7 @@ impl<const D: usize> Ground<D> {
         let mut sum = [0.0; 3];
         let mut best: Option<(Plane, f64)> = None;
         let mut count = 0;
-        for (plane, miss) in found.into_iter().flatten() {
+        for (plane, miss) in found.into_iter().flatten().filter(|found| found.1 <= FAR) {
             if best.is_none_or(|(_, least)| miss < least) {
                 best = Some((plane, miss));
             }
@@ -129,10 +131,11 @@ impl<const D: usize> Ground<D> {
                 }
             }
         }
+        let (mut plane, _) = best?;
         if D > 2 && count > 1 && sum.iter().any(|n| n.abs() > 0.1) {
-            return Some(self.holding(around.cell(), sum, around.fraction()));
+            plane.normal = sum;
         }
-        best.map(|(plane, _)| plane)
+        Some(self.holding(around.cell(), plane.normal, around.fraction()))
     }
 
     /// By how much a plane of a cell misses the matter in it and around it, cell by cell.

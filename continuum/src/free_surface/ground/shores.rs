@@ -37,11 +37,13 @@ pub(crate) struct Shores {
     next: Vec<Shore>,
     /// Whether dry ground lies beside a cell with matter.
     is_last: Vec<bool>,
+    /// Whether such a cell lies beside it, or it is one.
+    is_near: Vec<bool>,
 }
 
 /// The surface in a cell.
 #[derive(Debug, Clone, Copy)]
-pub(super) struct Shore {
+pub(crate) struct Shore {
     cell: usize,
     /// The plane that fits best.
     pub fitted: Plane,
@@ -58,7 +60,8 @@ impl Shores {
         (shore.weight > 0.0).then_some(&shore.plane)
     }
 
-    pub(super) fn at(&self, cell: usize) -> Option<&Shore> {
+    /// The same and how far it is known.
+    pub(crate) fn at(&self, cell: usize) -> Option<&Shore> {
         let at = self.cells.binary_search_by_key(&cell, |shore| shore.cell);
         Some(&self.cells[at.ok()?])
     }
@@ -72,17 +75,22 @@ impl Shores {
         planes: &[Option<Plane>],
     ) {
         self.cells.clear();
-        self.mark_last(ground, topology, fractions, planes);
+        self.mark(ground, topology, fractions, planes);
         for (cell, plane) in planes.iter().enumerate() {
             let Some(plane) = plane.filter(|_| fractions[cell] > DUST) else {
                 continue;
             };
             let around = Neighbourhood::around(topology, fractions, cell);
-            if around.any(|at| self.is_last[at]) && ground.miss(&around, &plane, EXACT) > EXACT {
+            let is_near = self.is_near[cell];
+            if !is_near && !around.any(|at| self.is_near[at]) {
+                continue;
+            }
+            let is_exact = ground.miss(&around, &plane, EXACT) <= EXACT;
+            if is_near || is_exact {
                 self.cells.push(Shore {
                     cell,
                     fitted: plane,
-                    weight: 0.0,
+                    weight: f64::from(is_exact),
                     plane,
                 });
             }
@@ -90,39 +98,54 @@ impl Shores {
         for _ in 0..PASSES {
             self.next.clear();
             for shore in &self.cells {
+                if shore.weight == 1.0 {
+                    self.next.push(*shore);
+                    continue;
+                }
                 let around = Neighbourhood::around(topology, fractions, shore.cell);
-                let beside = topology.cell_neighbours[shore.cell].iter().flatten();
-                let beside = beside.filter_map(|&at| match at {
-                    NONE => None,
-                    at => self.plane(at).or(planes[at].as_ref()),
+                let beside = (0..2 * D).filter_map(|way| {
+                    let (axis, side) = (way / 2, way % 2);
+                    let at = topology.cell_neighbours[shore.cell][axis][side];
+                    if at == NONE {
+                        return None;
+                    }
+                    let plane = self.plane(at).or(planes[at].as_ref())?;
+                    let mut back = [0.0; 3];
+                    back[axis] = if side == 1 { -1.0 } else { 1.0 };
+                    Some(seen_from(plane, back))
                 });
-                let normals =
-                    std::iter::once(shore.fitted.normal).chain(beside.map(|plane| plane.normal));
+                let at_hand = std::iter::once(shore.fitted).chain(beside);
                 let own = planes[shore.cell].unwrap_or(shore.plane);
                 self.next
-                    .push(ground.shore(&around, &own, normals).unwrap_or(*shore));
+                    .push(ground.shore(&around, &own, at_hand).unwrap_or(*shore));
             }
             std::mem::swap(&mut self.cells, &mut self.next);
         }
     }
 
-    fn mark_last<const D: usize>(
+    /// Notes beside which cells with matter dry ground lies, and beside which ones of those.
+    fn mark<const D: usize>(
         &mut self,
         ground: &Ground<D>,
         topology: &Topology<D>,
         fractions: &[f64],
         planes: &[Option<Plane>],
     ) {
+        let is_dry = |at: usize| {
+            fractions[at] <= DUST
+                && ground.free[at] > 0.0
+                && (ground.solid[at] > 0.0 || ground.wall[at] != [0.0; D])
+        };
+        let beside = |cell: usize, holds: &dyn Fn(usize) -> bool| {
+            planes[cell].is_some() && Neighbourhood::around(topology, fractions, cell).any(holds)
+        };
         self.is_last.clear();
         self.is_last
-            .extend(planes.iter().enumerate().map(|(cell, plane)| {
-                plane.is_some()
-                    && Neighbourhood::around(topology, fractions, cell).any(|at| {
-                        fractions[at] <= DUST
-                            && ground.free[at] > 0.0
-                            && (ground.solid[at] > 0.0 || ground.wall[at] != [0.0; D])
-                    })
-            }));
+            .extend((0..planes.len()).map(|cell| beside(cell, &is_dry)));
+        let is_last = &self.is_last;
+        self.is_near.clear();
+        self.is_near
+            .extend((0..planes.len()).map(|cell| beside(cell, &|at| is_last[at])));
     }
 }
 
@@ -132,9 +155,9 @@ impl<const D: usize> Ground<D> {
         &self,
         around: &Neighbourhood<'_, D>,
         own: &Plane,
-        normals: impl Iterator<Item = [f64; 3]>,
+        at_hand: impl Iterator<Item = Plane>,
     ) -> Option<Shore> {
-        let (fitted, miss) = self.fitted_plane(around, normals)?;
+        let (fitted, miss) = self.fitted_plane(around, at_hand)?;
         let weight = ((FITS[1] - miss) / (FITS[1] - FITS[0])).clamp(0.0, 1.0);
         let stands_out = |(cell, low, _): (usize, [f64; 3], f64)| {
             self.standing_out(cell, &seen_from(&fitted, low)) > STANDS_OUT
