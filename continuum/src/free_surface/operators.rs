@@ -25,6 +25,8 @@ use crate::wall_friction::{PointLaw, SideWalls};
 
 /// Smallest θ in the pressure gradient and in the pressure at walls.
 const NEAREST_SURFACE: f64 = 0.005;
+/// Smallest fall of the pressure over a cell towards a shore, over that in the active one, where planes do not fit.
+const LEAST_FALL: f64 = 0.2;
 /// Smallest θ in the extrapolation of pressure beyond the surface.
 pub(super) const NEAREST_EXTRAPOLATION: f64 = 0.25;
 /// An axis along which gravity has less than this part of all of it lies across upright faces.
@@ -174,8 +176,9 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 None => 1.0,
             });
             let [inner, outer] = self.depths_of_centres(active, other, axis, side);
-            if inner > 0.0 && outer >= 0.0 && here.min(there) > 0.0 {
-                return Beyond::Shore(here.min(there) * (outer / inner).min(1.0));
+            if inner > 0.0 && outer >= 0.0 {
+                let least = (1.0 - here.min(there)) * LEAST_FALL;
+                return Beyond::Shore((outer / inner).min(1.0 - least));
             }
         }
         Beyond::Air(self.surface_distance(active, other, axis, side))
@@ -648,8 +651,8 @@ pub(super) enum Beyond {
     /// The surface at the distance θ, in cells.
     Air(f64),
     /// The shore. Ground takes up so much of the cell beyond that it is not active though its centre lies below the surface: the
-    /// pressure there over that in the active cell, as their depths, where planes fit. (Taken from planes that do not, it
-    /// may leave the pressure of a cell nothing to push, and the step no solution.)
+    /// pressure there over that in the active cell, as their depths. (Where planes do not fit it is held back, else a cell's
+    /// pressure may have nothing left to push, and the step no solution.)
     Shore(f64),
 }
 
