@@ -188,6 +188,3 @@ impl<const D: usize> Ground<D> {
         self.solid[cell] - (all - self.matter_under(cell, plane))
     }
 }
-
-#[cfg(test)]
-mod tests;
