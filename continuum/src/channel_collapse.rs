@@ -239,20 +239,11 @@ impl ChannelCollapse {
     /// Largest difference of the filled fraction between a cell and its mirror image across the middle of the
     /// channel, where the grid holds its whole width.
     pub fn asymmetry(&self) -> f64 {
-        let [columns, across, _] = self.flow.grid().cell_counts();
-        if !self.case.whole {
-            return 0.0;
+        if self.case.whole {
+            self.flow.asymmetry_across()
+        } else {
+            0.0
         }
-        let mut largest = 0.0_f64;
-        for layer in self.flow.state().fractions.chunks_exact(columns * across) {
-            let strips = layer.chunks_exact(columns);
-            for (strip, mirrored) in strips.clone().zip(strips.rev()) {
-                for (a, b) in strip.iter().zip(mirrored) {
-                    largest = largest.max((a - b).abs());
-                }
-            }
-        }
-        largest
     }
 
     /// Fields of the cells with material, x fastest, in SI units; y = 0 is a wall.

@@ -4,16 +4,21 @@
 //! leaves at x = L ([`crate::free_surface::Inflow`]). Fed with Bagnold's profile it is in equilibrium with
 //! friction and passes through as it is ([`crate::bagnold`]); fed with a plug it speeds up or slows down over a
 //! length, and its depth changes with it. Volume is accounted for: what is in the chute is what was there, and
-//! came in, less what went out.
+//! came in, less what went out. In space ([`Across`]) the chute has sides, and what it is asked for is a mean across it.
+
+mod across;
+
+pub use across::{Across, Sides, SpaceChute};
 
 use serde::{Deserialize, Serialize};
 
 use crate::bagnold::BagnoldCase;
+use crate::discretisation::{COMPONENTS, VELOCITIES};
 use crate::error::{Error, require};
 use crate::free_surface::{
     CellFields, Inflow, SurfaceFlow, SurfaceOptions, SurfaceState, SurfaceStep,
 };
-use crate::grid::{Axis, Boundary, Grid};
+use crate::grid::{Axis, Boundary, DIMENSIONS, Grid};
 use crate::rheology::{MuI, ShearLaw};
 use crate::units::Units;
 
@@ -157,10 +162,15 @@ impl<L: ShearLaw + Clone> OpenChuteCase<L> {
 }
 
 /// A chute under way.
-pub struct OpenChute<L: ShearLaw + Clone = MuI> {
+pub struct OpenChute<
+    L: ShearLaw + Clone = MuI,
+    const D: usize = DIMENSIONS,
+    const C: usize = COMPONENTS,
+    const V: usize = VELOCITIES,
+> {
     case: OpenChuteCase<L>,
     units: Units,
-    flow: SurfaceFlow<L>,
+    flow: SurfaceFlow<L, D, C, V>,
     start_volume: f64,
 }
 
@@ -171,34 +181,66 @@ impl<L: ShearLaw + Clone> OpenChute<L> {
     /// Parameters or settings out of range.
     pub fn new(case: &OpenChuteCase<L>, options: &SurfaceOptions) -> Result<Self, Error> {
         case.validate()?;
-        let units = case.units();
-        let h = 1.0 / case.cells as f64;
-        let (columns, rows) = (case.columns(), case.rows());
-        let axis = |cells: usize, low| Axis::Bounded {
-            length: cells as f64 * h,
+        let grid = Grid::with_moving_surface([case.along(), case.upwards()])?;
+        let (law, g) = (case.rheology.in_units(&case.units()), case.slope.sin_cos());
+        let flow = SurfaceFlow::at_rest(grid, case.start(1), law, [g.0, -g.1], *options)?;
+        Self::fed(case, flow, 1)
+    }
+}
+
+impl<L: ShearLaw + Clone> OpenChuteCase<L> {
+    fn axis(&self, cells: usize, low: Boundary) -> Axis {
+        Axis::Bounded {
+            length: cells as f64 * (1.0 / self.cells as f64),
             cells,
             low,
             high: Boundary::FreeSlip,
-        };
-        let grid = Grid::with_moving_surface([
-            axis(columns, Boundary::FreeSlip),
-            axis(rows, Boundary::NoSlip { velocity: 0.0 }),
-        ])?;
-        let filled = |row: usize| if row < case.cells { 1.0 } else { 0.0 };
+        }
+    }
+
+    /// The axis from end to end, in natural units.
+    fn along(&self) -> Axis {
+        self.axis(self.columns(), Boundary::FreeSlip)
+    }
+
+    /// The axis from the floor to the top of the grid.
+    fn upwards(&self) -> Axis {
+        self.axis(self.rows(), Boundary::NoSlip { velocity: 0.0 })
+    }
+
+    /// Filled part of the cells of a row of what enters.
+    fn filled(&self, row: usize) -> f64 {
+        if row < self.cells { 1.0 } else { 0.0 }
+    }
+
+    /// Filled parts of all cells at the start, of a grid with so many cells across.
+    fn start(&self, across: usize) -> Vec<f64> {
+        let layer = self.columns() * across;
+        let cells = 0..layer * self.rows();
+        cells.map(|cell| self.filled(cell / layer)).collect()
+    }
+}
+
+impl<L: ShearLaw + Clone, const D: usize, const C: usize, const V: usize> OpenChute<L, D, C, V> {
+    /// Opens the ends of a chute with so many cells across it, and lets it flow as it enters.
+    fn fed(
+        case: &OpenChuteCase<L>,
+        flow: SurfaceFlow<L, D, C, V>,
+        across: usize,
+    ) -> Result<Self, Error> {
+        let units = case.units();
+        let h = 1.0 / case.cells as f64;
         let speed = |row: usize| case.speed((row as f64 + 0.5) * h * case.depth) / units.velocity;
+        let rows = (0..case.rows()).flat_map(|row| std::iter::repeat_n(row, across));
         let inflow = Inflow {
-            speeds: (0..rows).map(speed).collect(),
-            fractions: (0..rows).map(filled).collect(),
+            speeds: rows.clone().map(speed).collect(),
+            fractions: rows.map(|row| case.filled(row)).collect(),
         };
-        let fractions = (0..columns * rows).map(|cell| filled(cell / columns));
-        let gravity = [case.slope.sin(), -case.slope.cos()];
-        let law = case.rheology.in_units(&units);
         let speeds = inflow.speeds.clone();
-        let mut flow = SurfaceFlow::at_rest(grid, fractions.collect(), law, gravity, *options)?
-            .with_open_ends(inflow)?;
+        let mut flow = flow.with_open_ends(inflow)?;
         let mut state = flow.state().clone();
         for (face, u) in state.velocity[0].iter_mut().enumerate() {
-            *u = speeds[face / (columns + 1)];
+            *u = speeds[face / (case.columns() + 1)];
         }
         flow.set_state(state)?;
         Ok(Self {
@@ -215,7 +257,7 @@ impl<L: ShearLaw + Clone> OpenChute<L> {
     }
 
     /// The flow, in natural units.
-    pub fn flow(&self) -> &SurfaceFlow<L> {
+    pub fn flow(&self) -> &SurfaceFlow<L, D, C, V> {
         &self.flow
     }
 
@@ -223,7 +265,7 @@ impl<L: ShearLaw + Clone> OpenChute<L> {
     ///
     /// # Errors
     /// [`Error::ForeignState`] if the state belongs to another grid.
-    pub fn set_state(&mut self, state: SurfaceState) -> Result<(), Error> {
+    pub fn set_state(&mut self, state: SurfaceState<D, C>) -> Result<(), Error> {
         self.flow.set_state(state)
     }
 
@@ -244,7 +286,7 @@ impl<L: ShearLaw + Clone> OpenChute<L> {
     /// Volume in the chute, and what has come in and gone out, per width (m²).
     pub fn volumes(&self) -> [f64; 3] {
         let [entered, left] = self.flow.state().passed;
-        let area = self.case.depth * self.case.depth;
+        let area = self.case.depth * self.case.depth / self.breadth();
         [self.flow.volume(), entered, left].map(|volume| volume * area)
     }
 
@@ -255,34 +297,55 @@ impl<L: ShearLaw + Clone> OpenChute<L> {
         gained / (self.start_volume + entered)
     }
 
-    /// Distances from the upper end and depths there (m).
-    pub fn profile(&self) -> (Vec<f64>, Vec<f64>) {
-        let h = self.case.depth / self.case.cells as f64;
-        let depths = self.flow.heights();
-        let x = (0..depths.len()).map(|column| (column as f64 + 0.5) * h);
-        (
-            x.collect(),
-            depths.iter().map(|d| d * self.case.depth).collect(),
-        )
+    /// Cells across what is computed.
+    fn across(&self) -> usize {
+        self.flow.grid().cell_counts()[1..D - 1].iter().product()
     }
 
-    /// Heights (m) and speeds along the chute (m/s) half way down, in the cells of which more than half holds
-    /// material.
+    /// What is computed across, over the depth; one in a plane.
+    fn breadth(&self) -> f64 {
+        let axes = &self.flow.grid().axes()[1..D - 1];
+        axes.iter()
+            .map(|axis| axis.spacing() * axis.cells() as f64)
+            .product()
+    }
+
+    /// Distances from the upper end and depths there, their means across (m).
+    pub fn profile(&self) -> (Vec<f64>, Vec<f64>) {
+        let h = self.case.depth / self.case.cells as f64;
+        let (columns, across) = (self.case.columns(), self.across());
+        let depths = self.flow.heights();
+        let mean = |column: usize| {
+            let strips = depths[column..].iter().step_by(columns);
+            strips.sum::<f64>() / across as f64 * self.case.depth
+        };
+        let x = (0..columns).map(|column| (column as f64 + 0.5) * h);
+        (x.collect(), (0..columns).map(mean).collect())
+    }
+
+    /// Heights (m) and speeds along the chute (m/s) half way down, their means across, in the cells of which more than
+    /// half holds material.
     pub fn speeds(&self) -> (Vec<f64>, Vec<f64>) {
         let h = self.case.depth / self.case.cells as f64;
-        let (columns, state) = (self.case.columns(), self.flow.state());
+        let (columns, across, state) = (self.case.columns(), self.across(), self.flow.state());
         let middle = columns / 2;
-        let rows = state.fractions.chunks_exact(columns).enumerate();
-        let rows = rows.filter(|(_, row)| 0.5 * (row[middle - 1] + row[middle]) > 0.5);
-        rows.map(|(n, _)| {
-            let u = state.velocity[0][n * (columns + 1) + middle];
-            ((n as f64 + 0.5) * h, u * self.units.velocity)
-        })
-        .unzip()
+        let row = |n: usize| {
+            let strips = (n * across..(n + 1) * across).filter(|strip| {
+                let cells = strip * columns + middle;
+                0.5 * (state.fractions[cells - 1] + state.fractions[cells]) > 0.5
+            });
+            let u = |strip: usize| state.velocity[0][strip * (columns + 1) + middle];
+            let (count, sum) = strips.fold((0, 0.0), |(n, sum), strip| (n + 1, sum + u(strip)));
+            (count > 0).then(|| {
+                let speed = sum / f64::from(count) * self.units.velocity;
+                ((n as f64 + 0.5) * h, speed)
+            })
+        };
+        (0..self.case.rows()).filter_map(row).unzip()
     }
 
     /// Fields of the cells with material, x fastest, in SI units, x along the chute and z normal to it.
-    pub fn fields(&self) -> Vec<CellFields> {
+    pub fn fields(&self) -> Vec<CellFields<D, C>> {
         let mut fields = self.flow.cell_fields();
         for f in &mut fields {
             f.scale(self.case.depth, &self.units);

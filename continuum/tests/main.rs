@@ -15,6 +15,7 @@ mod laws;
 mod manufactured;
 mod multigrid;
 mod open_ends;
+mod open_ends_in_space;
 mod outside;
 mod sheared_layers;
 mod shores;

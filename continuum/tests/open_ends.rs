@@ -136,6 +136,10 @@ fn inflow_that_does_not_fit_is_refused_by_name() {
             "inflow.speeds",
         ),
         (
+            refused(Boundary::FreeSlip, inflow(0.0, 4)),
+            "greater than 0 in all",
+        ),
+        (
             refused(Boundary::NoSlip { velocity: 0.0 }, inflow(1.0, 4)),
             "smooth walls",
         ),

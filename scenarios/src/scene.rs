@@ -27,6 +27,7 @@ mod cylinder_terrain;
 mod error;
 mod friction_keys;
 mod friction_law;
+mod grain_intervals;
 mod grains;
 mod ground_source;
 mod impact;
@@ -69,6 +70,7 @@ pub use cylinder_of_grains::{GrainCylinderGrid, GrainCylinderKeys, GrainCylinder
 pub use cylinder_terrain::ReliefKeys;
 pub use error::SceneError;
 pub use friction_law::LawVisitor;
+pub use grain_intervals::GrainIntervals;
 pub use grains::GrainsScene;
 pub use ground_source::GroundSource;
 pub use impact::{ImpactScene, RollingKeys};
@@ -81,7 +83,7 @@ pub use law::{
     CohesionKind, LawKeys, LeverKind, MemoryKind, NormalKind, Parts, RollingKind, TangentialKind,
 };
 pub use layer_case::{LayerCase, LayerVisitor};
-pub use open_chute::{InflowKeys, OpenChuteGrid, OpenChuteScene};
+pub use open_chute::{AcrossKeys, InflowKeys, OpenChuteGrid, OpenChuteScene};
 pub use overlap::{InclineModel, NormalMotionKind, OverlapKeys};
 pub use settle::{SettleFloor, SettleGrains, SettleScene};
 pub use sheared::{ExactFlow, ShearedCase, ShearedScene};

@@ -236,6 +236,19 @@ fn interrupted_open_chute_goes_on_to_the_same_state() {
     });
 }
 
+/// The same in space.
+#[test]
+fn interrupted_open_chute_in_space_goes_on_to_the_same_state() {
+    goes_on_to_the_same_state("run open-chute", |out| {
+        let mut list = vec!["run", "open-chute", "--out", out];
+        let across = "in_space={breadth=0.05,cells=6,walls={contact=\"free-slip\"}}";
+        for set in ["scale=0.5", "duration_scaled=1.5", across] {
+            list.extend(["--set", set]);
+        }
+        list
+    });
+}
+
 /// `begun` is what the log says when there is a run to stop.
 fn goes_on_to_the_same_state(begun: &str, arguments: impl Fn(&'static str) -> Vec<&'static str>) {
     let folder = tempfile::tempdir().unwrap();

@@ -1,24 +1,46 @@
-//! A column whose grains lie between two continua, from the command line.
+//! A column whose grains lie between two continua, or its continuum between grains, from the command line.
 
 use crate::command::{
-    INTERVAL, SMALL_JOINED_COLUMN, colluvium, hash, succeed, summary, table, value,
+    CORE, INTERVAL, SMALL_JOINED_COLUMN, colluvium, hash, succeed, summary, table, value,
 };
 
 fn arguments<'a>(command: &'a str, out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
+    arguments_of(INTERVAL, command, out, more)
+}
+
+/// With these zones.
+fn arguments_of<'a>(
+    zones: &[&'a str],
+    command: &'a str,
+    out: &'a str,
+    more: &[&'a str],
+) -> Vec<&'a str> {
     let mut list = vec![command, "column-collapse"];
     if command == "run" {
         list.extend(["--out", out]);
     }
-    for set in SMALL_JOINED_COLUMN.iter().chain(INTERVAL).chain(more) {
+    for set in SMALL_JOINED_COLUMN.iter().chain(zones).chain(more) {
         list.extend(["--set", set]);
     }
     list
 }
 
-/// Of the same settled column: all grains, grains in the middle with one thread and with two, and with nothing exchanged. What runs out is
-/// the continuum in front of the grains, pushed by what lies behind them.
+/// What runs out is the continuum in front of the grains, pushed by what lies behind them.
 #[test]
 fn a_column_collapses_through_the_grains_in_its_middle() {
+    collapse(INTERVAL, 1.3);
+}
+
+/// What runs out is grains, and those at the wall hold the continuum up from behind.
+#[test]
+fn a_column_collapses_through_the_continuum_in_its_middle() {
+    collapse(CORE, 2.0);
+}
+
+/// Of the same settled column: all grains, these zones with one thread and with two, and with nothing exchanged, which misses the deposit
+/// by so much more at the least.
+fn collapse(zones: &[&str], worse: f64) {
+    let arguments = |command, out, more: &[&'static str]| arguments_of(zones, command, out, more);
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     for (name, sets) in [
@@ -55,6 +77,7 @@ fn a_column_collapses_through_the_grains_in_its_middle() {
         assert_eq!(value(&joined, &format!("{edge}_grains_escaped")), 0.0);
         assert!(value(&control, &format!("{edge}_grains_escaped")) > 3.0);
     }
+    ends_as_grains(&joined, &grains);
     for name in ["ledger_grains", "ledger_exchange"] {
         println!("{name} {:.1e}", value(&joined, name));
         assert!(value(&joined, name) < 1e-10);
@@ -71,7 +94,33 @@ fn a_column_collapses_through_the_grains_in_its_middle() {
     };
     let (joint, without) = (apart("joined"), apart("control"));
     println!("deposits apart: joined {joint:.4}, nothing exchanged {without:.4}");
-    assert!(joint < 0.08 && without > 1.3 * joint, "{joint} {without}");
+    assert!(joint < 0.08 && without > worse * joint, "{joint} {without}");
+}
+
+/// Where 99 % of the area end is that of the grains alone.
+fn ends_as_grains(joined: &serde_json::Value, grains: &serde_json::Value) {
+    let ratio = value(joined, "x_of_share") / value(grains, "x_of_share");
+    println!("place of 99 % of the area: {ratio:.4} of that of grains");
+    assert!((ratio - 1.0).abs() < 0.03, "{ratio}");
+}
+
+/// Three edges: grains at the wall and farther on, continua between them and at the front.
+#[test]
+fn a_list_of_intervals_has_continua_between_them() {
+    let folder = tempfile::tempdir().unwrap();
+    let zones = ["zones.x=[[0, 1], [1.5, 3.1]]", "duration_scaled=1"];
+    succeed(folder.path(), &arguments_of(CORE, "run", "x", &zones));
+    let found = summary(&folder.path().join("x"));
+    for edge in ["edge_1", "edge_2", "edge_3"] {
+        let [slip, escaped] =
+            ["slip", "grains_escaped"].map(|n| value(&found, &format!("{edge}_{n}")));
+        println!("{edge}: slip {slip:.1e}, escaped {escaped}");
+        assert!(slip < 0.05 && slip > 0.0);
+    }
+    for name in ["ledger_grains", "ledger_exchange"] {
+        assert!(value(&found, name) < 1e-10, "{name}");
+    }
+    assert!(value(&found, "handshake_mass").abs() < 0.02);
 }
 
 /// Grains that reach up to the front are what one edge leaves, with the same bits.
@@ -110,6 +159,15 @@ fn the_plan_says_where_both_edges_are() {
     ] {
         assert!(said.contains(word), "{word}: {said}");
     }
+    let said = succeed(folder.path(), &arguments_of(CORE, "plan", "", &[]));
+    for word in [
+        "between 1.0000 and 2.6000 m from the wall is a continuum",
+        "continuum from the low edge at 1.0000 m (10.0 d) to the high edge at 2.6000 m (26.0 d)",
+        "zones.x = [[0, 1], [2.6, 99]]",
+        "61 % of the grain-steps",
+    ] {
+        assert!(said.contains(word), "{word}: {said}");
+    }
 }
 
 #[test]
@@ -119,7 +177,43 @@ fn bad_intervals_are_refused_by_key() {
         (
             &["zones.x=[3.2, 0.8]"][..],
             "zones.x",
-            "continuum between grains",
+            "a list of such intervals that rises",
+        ),
+        (
+            &["zones.x=[[0, 1], [0.9, 99]]"],
+            "zones.x",
+            "a list of such intervals that rises",
+        ),
+        (&["zones.x=[]"], "zones.x", "array of 2 values"),
+        (
+            &["zones.x=[[0, 1], [2.6, 99, 3]]"],
+            "zones.x[1]",
+            "array of 2 values",
+        ),
+        (
+            &["zones.x=[[0, 1], [1.3, 99]]"],
+            "zones.x",
+            "some continuum lies between two intervals",
+        ),
+        (
+            &["zones.x=[[0, 0.8], [2.6, 99]]"],
+            "zones.x",
+            "at least 1.0000 m wide: an overlap",
+        ),
+        (
+            &["zones.x=[[0, 1], [3.2, 99]]"],
+            "zones.x",
+            "at least 1.0000 m wide: an overlap",
+        ),
+        (
+            &["zones.x=[[0, 1], [4.2, 99]]"],
+            "zones.x",
+            "within the column",
+        ),
+        (
+            &["zones.x=[[0, 1], [2.6, 99]]", "zones.rest_scaled=0.1"],
+            "zones.rest_scaled",
+            "up to the wall",
         ),
         (&["zones.x=[0.0, 4.0]"], "zones.x", "leaves no continuum"),
         (

@@ -1,7 +1,7 @@
 //! Runs that are killed or stopped at any moment go on to the same state.
 
 use crate::command::{
-    INSTALMENTS, INTERVAL, MOVING_EDGE, SMALL_COMET_CLIFF, SMALL_HYBRID, SMALL_JOINED_COLUMN,
+    CORE, INSTALMENTS, INTERVAL, MOVING_EDGE, SMALL_COMET_CLIFF, SMALL_HYBRID, SMALL_JOINED_COLUMN,
     colluvium, hash, pause, succeed, table,
 };
 use rand::{RngExt, SeedableRng};
@@ -174,12 +174,11 @@ fn a_killed_joined_column_goes_on_in_the_middle_of_an_exchange() {
     assert!(!moves.is_empty());
 }
 
-/// Grains between two continua, whose edges move.
-#[test]
-fn a_killed_interval_of_grains_goes_on_in_the_middle_of_an_exchange() {
+/// Both edges of its grains move, or of the continuum between them.
+fn killed_between_edges(zones: &[&str], seed: u64) {
     let sets = [
         SMALL_JOINED_COLUMN,
-        INTERVAL,
+        zones,
         &[
             "zones.moving=true",
             "zones.rest_speed_scaled=0.25",
@@ -190,9 +189,19 @@ fn a_killed_interval_of_grains_goes_on_in_the_middle_of_an_exchange() {
         ],
     ]
     .concat();
-    let run = killed_and_whole("column-collapse", &sets, 19, 3);
+    let run = killed_and_whole("column-collapse", &sets, seed, 3);
     let moves = table(&run.path().join("parts/moves.csv")).1;
     assert!(!moves.is_empty());
+}
+
+#[test]
+fn a_killed_interval_of_grains_goes_on_in_the_middle_of_an_exchange() {
+    killed_between_edges(INTERVAL, 19);
+}
+
+#[test]
+fn a_killed_continuum_between_grains_goes_on_in_the_middle_of_an_exchange() {
+    killed_between_edges(CORE, 23);
 }
 
 /// Before and after its debris has become a continuum.

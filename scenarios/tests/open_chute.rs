@@ -80,6 +80,42 @@ fn chutes_are_planned_and_bad_ones_refused_by_key() {
         ("grid.length_scaled=0.1", "grid.length_scaled", "at least"),
         ("grid.cells=500", "grid.cells", "at most 200000"),
         ("solver.courant=2", "solver.courant", "1"),
+        (
+            "in_space={breadth=0.1,cells=0}",
+            "in_space.cells",
+            "[1, 256]",
+        ),
+        (
+            "in_space={breadth=0.1,cells=2}",
+            "in_space.cells",
+            "at least 3",
+        ),
+        (
+            "in_space={breadth=-1,cells=4}",
+            "in_space.breadth",
+            "(0, 100000]",
+        ),
+        ("in_space={breadth=0.1}", "in_space.cells", "cells"),
+        (
+            "in_space={breadth=0.1,cells=4,whole=true}",
+            "in_space.whole",
+            "left out",
+        ),
+        (
+            "in_space={breadth=0.1,cells=4,walls={contact=\"coulomb\"}}",
+            "in_space.walls.friction",
+            "coulomb",
+        ),
+        (
+            "in_space={breadth=0.1,cells=4,walls={contact=\"free-slip\",friction=0.3}}",
+            "in_space.walls.friction",
+            "left out",
+        ),
+        (
+            "in_space={breadth=0.1,cells=200}",
+            "grid.cells",
+            "at most 40000",
+        ),
     ] {
         let arguments = ["run", "open-chute", "--out", "x", "--set", set];
         let refused = colluvium(folder.path(), &arguments);
@@ -103,4 +139,50 @@ fn chutes_are_planned_and_bad_ones_refused_by_key() {
     ];
     let refused = colluvium(folder.path(), &both);
     assert_eq!(refused.status.code(), Some(2));
+}
+
+/// The chute in space: periodic across it is the plane's, rubbing walls hold the layer back and thicken it; it is its own mirror
+/// image, and its fields are those of space.
+#[test]
+fn chutes_in_space_are_planned_and_run() {
+    let folder = tempfile::tempdir().unwrap();
+    let small = ["scale=0.375", "grid.length_scaled=2", "duration_scaled=1.5"];
+    let run = |out: &str, sets: &[&str]| {
+        let mut list = vec!["run", "open-chute", "--out", out];
+        let sets = small.iter().chain(sets);
+        sets.for_each(|set| list.extend(["--set", set]));
+        succeed(folder.path(), &list);
+        let found = summary(&folder.path().join(out));
+        assert!(value(&found, "volume_error").abs() < 1e-13);
+        found
+    };
+    let plane = run("plane", &[]);
+    let periodic = run("periodic", &["in_space={breadth=0.05,cells=8}"]);
+    for name in ["depth_at_end", "surface_speed", "volume", "entered", "left"] {
+        let [a, b] = [&plane, &periodic].map(|found| value(found, name));
+        assert!((a / b - 1.0).abs() < 1e-3, "{name}: {a} {b}");
+    }
+    let walls =
+        "in_space={breadth=0.05,cells=8,whole=true,walls={contact=\"coulomb\",friction=0.3}}";
+    let rubbed = run("rubbed", &[walls]);
+    let deeper = value(&rubbed, "depth_at_end") / value(&plane, "depth_at_end");
+    assert!(deeper > 1.01 && deeper < 1.2, "{deeper}");
+    assert!(value(&rubbed, "symmetry_error") < 1e-3);
+    assert_eq!(plane["results"].get("symmetry_error"), None);
+    let left_out = |found: &serde_json::Value| found["model"]["left_out"].to_string();
+    assert!(left_out(&plane).contains("third dimension"));
+    assert!(!left_out(&rubbed).contains("third dimension"));
+    let fields = folder.path().join("rubbed/fields.vtkhdf");
+    let frames = vtkhdf::read_series(&fields).unwrap();
+    // 6 cells across the depth, 12 along the chute, 3 across it.
+    assert_eq!(frames[0].scalars("pressure").unwrap().len(), 6 * 12 * 3);
+    assert!(frames[0].scalars("shear_stress_xy").is_ok());
+    let report = std::fs::read_to_string(folder.path().join("rubbed/report.html")).unwrap();
+    assert!(report.contains("Speed half way down"));
+    let planned = colluvium(folder.path(), &["plan", "open-chute", "--set", walls]);
+    let planned = String::from_utf8_lossy(&planned.stdout).into_owned();
+    assert!(
+        planned.contains("0.05 m broad") && planned.contains("8 across all"),
+        "{planned}"
+    );
 }

@@ -16,7 +16,7 @@ pub use state::{SpaceFields, SpaceState, Spent, SurfaceOptions, SurfaceState, Su
 use super::faces::ACTIVE;
 use super::ground::Ground;
 use super::ground::shores::Shores;
-use super::open_ends::Inflow;
+use super::open_ends::OpenEnds;
 use super::outside::Outside;
 use super::plane::Plane;
 use super::sliding::SlidingPlaces;
@@ -71,7 +71,7 @@ pub struct SurfaceFlow<
     outside: Option<Outside<D, C>>,
     /// Impulse of forces from outside that nobody has taken.
     untaken: [f64; D],
-    inflow: Option<Inflow>,
+    ends: Option<OpenEnds>,
     /// Matter and ground together.
     filled: Vec<f64>,
     solver: Option<(Vec<usize>, PrimalDual<C>)>,
@@ -388,7 +388,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                 orders: &orders,
                 incompressible: &incompressible,
                 ground: self.bed.as_ref(),
-                inflow: self.inflow.as_ref(),
+                ends: self.ends.as_ref(),
             },
             &mut self.state.fractions,
             &mut self.state.velocity,
@@ -442,5 +442,22 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             }
         }
         heights
+    }
+}
+
+impl<R: Rheology> SpaceFlow<R> {
+    /// Largest difference of the filled fraction between a cell and its mirror image across the middle of y.
+    pub fn asymmetry_across(&self) -> f64 {
+        let [columns, across, _] = self.grid.cell_counts();
+        let mut largest = 0.0_f64;
+        for layer in self.state.fractions.chunks_exact(columns * across) {
+            let strips = layer.chunks_exact(columns);
+            for (strip, mirrored) in strips.clone().zip(strips.rev()) {
+                for (a, b) in strip.iter().zip(mirrored) {
+                    largest = largest.max((a - b).abs());
+                }
+            }
+        }
+        largest
     }
 }

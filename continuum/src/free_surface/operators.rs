@@ -10,7 +10,7 @@
 use super::faces::{ACTIVE, ALIKE, Face, Faces, weight_onto};
 use super::fraction::volume_in;
 use super::ground::shores::Shores;
-use super::open_ends::Inflow;
+use super::open_ends::OpenEnds;
 use super::outside::Outside;
 use super::plane::Plane;
 use super::sliding::SlidingPlaces;
@@ -54,8 +54,8 @@ pub(crate) struct Material<'a, const D: usize = DIMENSIONS, const C: usize = COM
     pub faces: &'a Faces<D>,
     /// Walls beside the plane, which rub.
     pub side_walls: Option<SideWalls>,
-    /// What flows in at the low end of x, where the ends are open.
-    pub inflow: Option<&'a Inflow>,
+    /// Ends of x that are open.
+    pub ends: Option<&'a OpenEnds>,
     /// Acceleration by gravity.
     pub acceleration: [f64; D],
     /// What lies beyond the surface, if it is not free.
@@ -194,7 +194,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                         continue;
                     }
                     let Face::Own(j) = self.faces.role[axis][face] else {
-                        if self.inflow.is_some() && axis == 0 {
+                        if self.ends.is_some() && axis == 0 {
                             self.add_flux_at_edge(p, cell, side, parts);
                         }
                         continue;
@@ -287,7 +287,11 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             if (0..D).any(|axis| self.slides(axis, at)) {
                 self.add_sliding(cell, index, side, [filled(), share], points, places);
             }
-            let layer = self.under_layer(cell, side, share, filled);
+            // On an open end nothing slides: what crosses it is given, or moves with the column before it.
+            let layer = match self.is_open(at[0]) {
+                true => None,
+                false => self.under_layer(cell, side, share, filled),
+            };
             let volume = match (&layer, self.wall_share(at)) {
                 (Some(layer), _) => layer.volume,
                 (None, Some(factor)) => factor * share,
@@ -303,29 +307,25 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                     self.add_stretching(cell, axis, row, part * orientation, &mut point);
                 }
             }
-            if !self.add_shear_at_edge(at, &mut point) {
-                for high in 1..D {
-                    for low in 0..high {
-                        if self.slides(low, at) || self.slides(high, at) {
-                            continue;
-                        }
-                        // The edge through the corner: a cell along the other axes.
-                        let mut edge = index;
-                        edge[low] = at[low];
-                        edge[high] = at[high];
-                        let row = shear_row::<D>(low, high);
+            for high in 1..D {
+                for low in 0..high {
+                    if self.slides(low, at) || self.slides(high, at) {
+                        continue;
+                    }
+                    // The edge through the corner: a cell along the other axes.
+                    let mut edge = index;
+                    edge[low] = at[low];
+                    edge[high] = at[high];
+                    let row = shear_row::<D>(low, high);
+                    if low == 0 && self.is_open(at[0]) {
+                        self.add_shear_at_end(cell, edge, high, &mut point);
+                    } else {
                         let velocity_at = |c, face| self.velocity_at(c, face);
-                        add_corner_shear(
-                            self.grid,
-                            velocity_at,
-                            edge,
-                            [low, high],
-                            row,
-                            &mut point,
-                        );
-                        if part < 1.0 && ![low, high].iter().any(|&axis| self.sticks(axis, at)) {
-                            point.scale_rate(row, part);
-                        }
+                        let plane = [low, high];
+                        add_corner_shear(self.grid, velocity_at, edge, plane, row, &mut point);
+                    }
+                    if part < 1.0 && ![low, high].iter().any(|&axis| self.sticks(axis, at)) {
+                        point.scale_rate(row, part);
                     }
                 }
             }
@@ -364,8 +364,9 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 NONE => cell,
                 face => face,
             };
-            if let Some(j) = self.faces.role[component][face].unknown() {
-                point.add_velocity(j, component, 1.0);
+            match self.faces.role[component][face].unknown() {
+                Some(j) => point.add_velocity(j, component, 1.0),
+                None => point.add_known_rate(component, self.known_velocity(component, face)),
             }
         }
         if self.faces.pressure[cell] != NONE {
@@ -460,7 +461,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             }
         }
         let known = self.known_velocity(axis, faces[0]);
-        point.add_known_rate(0, -orientation * inverse * known);
+        point.add_known_rate(row, -orientation * inverse * known);
     }
 
     /// The pressure at the centre of a cell as an active cell times a factor: its own, or one
@@ -561,7 +562,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         // In space smooth walls are planes of symmetry, beyond which lies the same pressure.
         let wall = (0..D)
             .rev()
-            .filter(|&axis| axis > 0 || self.inflow.is_none())
+            .filter(|&axis| axis > 0 || !self.is_open(corner[0]))
             .find(|&axis| {
                 axes[axis]
                     .boundary_at(corner[axis])

@@ -132,8 +132,9 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                     NONE => cell,
                     face => face,
                 };
-                if let Some(j) = self.faces.role[along][face].unknown() {
-                    point.add_velocity(j, row, rate);
+                match self.faces.role[along][face].unknown() {
+                    Some(j) => point.add_velocity(j, row, rate),
+                    None => point.add_known_rate(row, rate * self.known_velocity(along, face)),
                 }
                 // A wall moves along the first of its axes.
                 if is_first {

@@ -14,7 +14,7 @@ use super::faces::ACTIVE;
 use super::fraction::{reconstruct, volume_in};
 use super::ground::Ground;
 use super::ground::settling::Settling;
-use super::open_ends::Inflow;
+use super::open_ends::OpenEnds;
 use super::plane::Plane;
 use super::topology::{NONE, Topology};
 use crate::grid::DIMENSIONS;
@@ -69,8 +69,8 @@ pub(crate) struct Motion<'a, const D: usize = DIMENSIONS> {
     pub incompressible: &'a [bool],
     /// Ground that cuts cells and faces.
     pub ground: Option<&'a Ground<D>>,
-    /// What flows in at the low end of x, where the ends are open.
-    pub inflow: Option<&'a Inflow>,
+    /// Ends of x that are open.
+    pub ends: Option<&'a OpenEnds>,
 }
 
 impl<const D: usize> Motion<'_, D> {
@@ -137,6 +137,7 @@ impl<const D: usize> Transport<D> {
         before.0.clone_from(fractions);
         before.1.clone_from(velocity);
         let share = 1.0 / orders.len() as f64;
+        let passed = self.passed;
         for (nth, order) in orders.iter().enumerate() {
             if nth > 0 {
                 fractions.clone_from(&before.0);
@@ -161,6 +162,9 @@ impl<const D: usize> Transport<D> {
                 };
             }
         }
+        for (sum, before) in self.passed.iter_mut().zip(passed) {
+            *sum = before + share * (*sum - before);
+        }
         self.before = before;
         self.mean = mean;
     }
@@ -184,8 +188,8 @@ impl<const D: usize> Transport<D> {
                 None => {
                     reconstruct(motion.topology, fractions, &mut self.planes);
                     self.volume_fluxes(motion, fractions, axis);
-                    if let (Some(inflow), 0) = (motion.inflow, axis) {
-                        self.pass_ends(motion, inflow, fractions);
+                    if let (Some(ends), 0) = (motion.ends, axis) {
+                        self.pass_ends(motion, ends, fractions);
                     }
                 }
                 Some(ground) => {
@@ -216,11 +220,9 @@ impl<const D: usize> Transport<D> {
     }
 
     /// Volume through open ends.
-    fn pass_ends(&mut self, motion: &Motion<'_, D>, inflow: &Inflow, fractions: &[f64]) {
+    fn pass_ends(&mut self, motion: &Motion<'_, D>, ends: &OpenEnds, fractions: &[f64]) {
         let start = &motion.carrier[0];
-        let width = start.len() / inflow.speeds.len();
-        for (row, filled) in inflow.fractions.iter().enumerate() {
-            let (first, last) = (row * width, row * width + width - 1);
+        for (first, last, filled) in ends.faces(start.len()) {
             let length = |face: usize| (start[face] * motion.courant[0]).max(0.0);
             self.fluxes[first] = length(first) * filled;
             let (donor, through) = (motion.topology.face_cells[0][last][0], length(last));
@@ -394,9 +396,11 @@ impl<const D: usize> Transport<D> {
             self.momentum[face] -= volume * carried;
             self.momentum[next] += volume * carried;
         }
-        if let (Some(inflow), 0, 1) = (motion.inflow, axis, component) {
+        if let (Some(ends), 0) = (motion.ends, axis)
+            && component > 0
+        {
             // What leaves takes its momentum along.
-            let columns = topology.faces(0) / inflow.speeds.len() - 1;
+            let columns = ends.columns;
             for face in (columns - 1..u.len()).step_by(columns) {
                 let out = topology.face_cells[component][face].map(|cell| match cell {
                     NONE => 0.0,

@@ -7,14 +7,14 @@ use colluvium_coupling::overlap::material_edge::{
 use colluvium_dem::{Grain, Simulation};
 use std::sync::OnceLock;
 
-const LENGTH: f64 = 34.0;
+pub const LENGTH: f64 = 34.0;
 /// Grains stay between these.
 const ENDS: [f64; 2] = [8.0, 26.0];
 /// Where the grid of the continuum above ends; it goes as far below zero.
-const END: f64 = 48.0;
+pub const END: f64 = 48.0;
 
 /// Grains at rest between a wall and a gate.
-fn settled() -> &'static [Grain] {
+pub fn settled() -> &'static [Grain] {
     static COLUMN: OnceLock<Vec<Grain>> = OnceLock::new();
     COLUMN.get_or_init(|| settle(LENGTH))
 }
@@ -31,7 +31,7 @@ fn mirrored() -> Vec<Grain> {
 }
 
 /// An edge below grains from `place` on.
-fn below(uncoupled: bool, place: f64, travel: Option<Travel>) -> MaterialEdgeSpec {
+pub fn below(uncoupled: bool, place: f64, travel: Option<Travel>) -> MaterialEdgeSpec {
     let mut spec = spec(settled_fraction(), uncoupled, place, travel);
     spec.case.aspect = HEIGHT / LENGTH;
     spec
@@ -55,7 +55,7 @@ fn both(uncoupled: bool, gate: bool, travel: Option<Travel>) -> [MaterialEdgeSpe
     ]
 }
 
-fn joined(grains: Vec<Grain>, gate: bool, specs: &[MaterialEdgeSpec]) -> Joined {
+pub fn joined(grains: Vec<Grain>, gate: bool, specs: &[MaterialEdgeSpec]) -> Joined {
     Joined::cut(
         Simulation::new(setup_of(LENGTH, grains, gate)).unwrap(),
         specs,
@@ -83,8 +83,9 @@ fn books_close(joined: &mut Joined) {
 }
 
 /// Speeds of grains and continua, how far the handshake surfaces have moved, and grains beyond an edge.
-fn calm(uncoupled: bool) -> ([f64; 2], f64, f64, Joined) {
-    let mut joined = joined(settled().to_vec(), true, &both(uncoupled, true, None));
+pub fn calm(specs: &[MaterialEdgeSpec]) -> ([f64; 2], f64, f64, Joined) {
+    let uncoupled = specs.iter().all(|spec| spec.settings.uncoupled);
+    let mut joined = joined(settled().to_vec(), true, specs);
     joined.advance(15.0, 0.9);
     let places = |joined: &Joined| -> Vec<f64> {
         let edges = joined.zone.edges().iter();
@@ -119,16 +120,29 @@ fn calm(uncoupled: bool) -> ([f64; 2], f64, f64, Joined) {
 /// grains fall into both continua.
 #[test]
 fn an_interval_of_grains_in_a_level_bed_stays_at_rest() {
-    let (speeds, moved, escaped, mut rests) = calm(false);
+    rests(&both(false, true, None), &both(true, true, None), 0.01);
+}
+
+/// Joined by these edges it rests, with surfaces that move by less than a part of a diameter, and by these it does not.
+pub fn rests(specs: &[MaterialEdgeSpec], controls: &[MaterialEdgeSpec], most: f64) {
+    let (speeds, moved, escaped, mut rests) = calm(specs);
     assert!(speeds[0] < 0.03 && speeds[1] < 1e-4, "{speeds:?}");
-    assert!(moved < 0.01 && escaped == 0.0);
+    assert!(moved < most && escaped == 0.0);
     books_close(&mut rests);
-    // The continua push towards each other, about as hard: 122 and 109 N, where the grains were not packed the same either.
+    // Both ends push about as hard: 122 and 109 N of an interval of grains, where they were not packed the same either.
     let [low, high] = [0, 1].map(|k| rests.zone.edges()[k].monitors().forces()[1]);
     assert!(low > 0.0 && (high / low - 1.0).abs() < 0.2, "{low} {high}");
-    let (_, _, escaped, control) = calm(true);
+    let (_, _, escaped, control) = calm(controls);
     let fallen = control.zone.edges().iter();
     assert!(fallen.map(|e| e.monitors().escaped).all(|n| n > 0.0) && escaped > 0.0);
+    let slips = |joined: &Joined| {
+        let edges = joined.zone.edges().iter();
+        edges
+            .map(|e| e.monitors().mean_slip())
+            .collect::<Vec<f64>>()
+    };
+    assert!(slips(&rests).iter().all(|slip| *slip < 0.02));
+    assert!(slips(&control).iter().all(|slip| *slip > 0.1));
 }
 
 /// Largest difference of two rows over the largest of either.
@@ -146,27 +160,32 @@ fn apart(one: &[f64], other: &[f64]) -> f64 {
 #[test]
 fn mirrored_grains_bear_mirrored_loads() {
     let [from, to] = ENDS;
-    let mirror = |x: f64| LENGTH - x;
+    let turned = |x: f64| LENGTH - x;
     let pairs = [
         (
             vec![below(false, from, None)],
-            vec![above(false, mirror(from), true, None)],
+            vec![above(false, turned(from), true, None)],
         ),
         (
             both(false, true, None).to_vec(),
             vec![
-                below(false, mirror(to), None),
-                above(false, mirror(from), true, None),
+                below(false, turned(to), None),
+                above(false, turned(from), true, None),
             ],
         ),
     ];
     for (specs, images) in pairs {
-        let mut own = joined(settled().to_vec(), true, &specs);
-        let mut image = joined(mirrored(), true, &images);
-        for _ in 0..2 {
-            own.advance(0.5, 1.0);
-            image.advance(0.5, 1.0);
-        }
+        mirror(&specs, &images, 1e-6);
+    }
+}
+
+/// Edges and their images bear mirrored loads but for a part, after some time and after twice that.
+pub fn mirror(specs: &[MaterialEdgeSpec], images: &[MaterialEdgeSpec], most: f64) {
+    let mut own = joined(settled().to_vec(), true, specs);
+    let mut image = joined(mirrored(), true, images);
+    for _ in 0..2 {
+        own.advance(0.5, 1.0);
+        image.advance(0.5, 1.0);
         let (one, other) = (
             own.zone.account(&own.simulation),
             image.zone.account(&image.simulation),
@@ -198,9 +217,9 @@ fn mirrored_grains_bear_mirrored_loads() {
             );
             assert!(a[3] != 0.0 && b[3] != 0.0);
             let forces = apart(&edge.monitors().forces(), &image.monitors().forces());
-            assert!(forces < 1e-6 && surface < 1e-6, "{forces} {surface}");
+            assert!(forces < most && surface < most, "{forces} {surface}");
         }
-        assert!(loads < 1e-6, "{loads}");
+        assert!(loads < most, "{loads}");
         // Not turned they would be as far apart as they are large.
         assert!(apart(&rows(&one, 1.0), &rows(&other, 1.0)) > 1e-3);
     }
@@ -210,8 +229,12 @@ fn mirrored_grains_bear_mirrored_loads() {
 /// that of angular momentum about the slab's axis too.
 #[test]
 fn both_edges_keep_their_books_while_a_column_collapses() {
-    let specs = both(false, false, Some(TRAVEL));
-    let mut joined = joined(settled().to_vec(), false, &specs);
+    collapse(&both(false, false, Some(TRAVEL)));
+}
+
+/// Such a column with edges that move.
+pub fn collapse(specs: &[MaterialEdgeSpec]) {
+    let mut joined = joined(settled().to_vec(), false, specs);
     joined
         .zone
         .open_angular_book(&mut joined.simulation)
@@ -232,14 +255,18 @@ fn both_edges_keep_their_books_while_a_column_collapses() {
 /// All of a zone comes back from its numbers in the middle of an exchange.
 #[test]
 fn a_zone_goes_on_from_its_numbers() {
-    let specs = both(false, false, Some(TRAVEL));
-    let mut own = joined(settled().to_vec(), false, &specs);
+    go_on(&both(false, false, Some(TRAVEL)));
+}
+
+/// Stops and goes on with the same bits.
+pub fn go_on(specs: &[MaterialEdgeSpec]) {
+    let mut own = joined(settled().to_vec(), false, specs);
     own.advance(5.0, 1.0);
     let mut memory = Vec::new();
     own.zone.write(&mut memory);
     let record = own.simulation.checkpoint();
     let resumed = Simulation::resume(setup_of(LENGTH, settled().to_vec(), false), &record).unwrap();
-    let zone = GrainZone::read(&specs, &memory, &resumed).unwrap();
+    let zone = GrainZone::read(specs, &memory, &resumed).unwrap();
     assert!(GrainZone::read(&specs[..1], &memory, &resumed).is_err());
     let mut other = Joined {
         simulation: resumed,
@@ -264,9 +291,10 @@ fn edges_that_enclose_no_grains_are_refused() {
         ..high
     };
     for (specs, word) in [
-        (vec![high, low], "continuum between grains"),
+        (vec![high, low], "the lower one first"),
+        (vec![low, low], "in turn"),
         (vec![low, near], "widths of both overlaps"),
-        (vec![], "one or two"),
+        (vec![], "at least one"),
     ] {
         let mut simulation = Simulation::new(setup_of(LENGTH, settled().to_vec(), true)).unwrap();
         let refused = GrainZone::cut(&specs, &mut simulation).err().unwrap();

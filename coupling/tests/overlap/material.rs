@@ -223,10 +223,10 @@ impl Joined {
     /// a quarter of the height below the surface.
     fn pressures(&self) -> [f64; 2] {
         let density = self.edge().spec().density();
-        let top = self.edge().continuum_heights().1[2];
+        let top = self.zone.continua()[0].heights().1[2];
         let [_, inner] = self.edge().spec().zones();
         let mut sums = [[0.0; 2]; 2];
-        for f in self.edge().collapse().fields() {
+        for f in self.zone.continua()[0].collapse().fields() {
             let [x, z] = [0, 1].map(|a| 0.5 * (f.lower[a] + f.upper[a]));
             if z > 0.75 * top || x > EDGE + inner || f.pressure <= 0.0 {
                 continue;

@@ -3,6 +3,7 @@
 //! Units: mean diameter, mean mass and gravity are 1; times are √(d/g).
 
 mod angular;
+mod between;
 mod books;
 mod comparison;
 mod growth;

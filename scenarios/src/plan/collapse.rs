@@ -49,7 +49,7 @@ pub(super) fn collapse(body: &CollapseScene, ground: Option<&CollapseGround>) ->
     let mut cells = format!("{} square cells of {spacing:.4e} m along x", case.cells);
     let mut courant = body.solver.courant;
     if let Some(case) = run::channel::case(body) {
-        courant = run::channel::options(body).courant;
+        courant = run::channel::options(&body.solver).courant;
         let words = run::collapse_ground::words_of;
         lines.say(
             "side walls",

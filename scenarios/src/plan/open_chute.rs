@@ -1,8 +1,9 @@
 //! The plan of a fed chute.
 
 use super::Lines;
-use crate::run;
+use crate::run::{self, collapse_ground::words_of};
 use crate::scene::{OpenChuteScene, Scene};
+use colluvium_continuum::open_chute::Sides;
 
 /// What a chute's plan says of the speed of what enters.
 pub(super) fn open_chute(
@@ -30,26 +31,37 @@ pub(super) fn open_chute(
         "inflow",
         &format!("{surface:.4} m/s at the surface, {profile}"),
     );
+    let mut shape = format!("squares of {spacing:.4e} m");
+    if let Some(across) = run::open_chute::across(body) {
+        let sides = match across.sides {
+            Sides::Periodic => "periodic across".to_owned(),
+            Sides::Walls(contact) => format!("side walls: {}", words_of(contact)),
+        };
+        lines.say("in space", &format!("{} m broad; {sides}", across.breadth));
+        let part = if across.whole { "all" } else { "half" };
+        shape = format!(
+            "cells of {spacing:.4e} m along x and z, {} across {part} of the chute",
+            across.cells
+        );
+    }
     lines.say(
         "grid",
         &format!(
-            "squares of {spacing:.4e} m, {} across the depth; {:.0} hold material",
+            "{shape}, {} across the depth; {:.0} hold material",
             body.cells(),
             body.filled()
         ),
     );
-    lines.say("left out", &run::open_chute::LEFT_OUT.join(", "));
+    lines.say("left out", &run::open_chute::left_out(body).join(", "));
     for remark in body.rheology.remarks() {
         lines.say("warning", &remark);
     }
     let largest = body.solver.largest_step_scaled * time;
-    let step = (body.solver.courant * spacing / surface).min(largest);
+    let courant = run::open_chute::options(body).courant;
+    let step = (courant * spacing / surface).min(largest);
     lines.say(
         "time step",
-        &format!(
-            "about {step:.4e} s (courant {}, at most {largest:.4e} s)",
-            body.solver.courant
-        ),
+        &format!("about {step:.4e} s (courant {courant}, at most {largest:.4e} s)"),
     );
     let steps = body.duration_scaled * time / step;
     lines.say(

@@ -6,7 +6,7 @@ use super::surface_fields::space_frame;
 use super::surface_run::{self, Course, Deposit, Followed, yields};
 use super::{Findings, Under};
 use crate::failure::Failure;
-use crate::scene::CollapseScene;
+use crate::scene::{CollapseScene, CollapseSolver};
 use crate::summary::{Quantity, Summary};
 use crate::table::Table;
 use crate::vtkhdf::Frame;
@@ -104,8 +104,8 @@ impl Followed<3, SPACE_COMPONENTS> for Falling<'_> {
 const LARGEST_COURANT: f64 = 0.45;
 
 /// The solver's settings in space.
-pub fn options(scene: &CollapseScene) -> SurfaceOptions {
-    let mut options = options_of(&scene.solver);
+pub fn options(solver: &CollapseSolver) -> SurfaceOptions {
+    let mut options = options_of(solver);
     options.courant = options.courant.min(LARGEST_COURANT);
     options
 }
@@ -118,7 +118,7 @@ pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, 
             under.scene.origin
         )));
     };
-    let collapse = ChannelCollapse::new(&case, &options(scene)).map_err(refused)?;
+    let collapse = ChannelCollapse::new(&case, &options(&scene.solver)).map_err(refused)?;
     let end = scene.duration_scaled * collapse.units().time();
     let mut falling = Falling { collapse, scene };
     let course = surface_run::follow(&mut falling, end, under)?;

@@ -166,24 +166,35 @@ impl<'a> JoinedColumn<'a> {
 
     /// What the column is joined from at each edge, at a solid fraction.
     pub(super) fn specs(&self, solid_fraction: f64) -> Result<Vec<MaterialEdgeSpec>, Failure> {
-        let edges = self.scene.edges().into_iter();
-        edges
-            .map(|(side, place)| self.spec(side, place, solid_fraction))
-            .collect()
+        let edges = self.scene.edges();
+        let of = |(k, &edge): (usize, &(Side, f64))| {
+            let other = match edge.0 {
+                Side::Below => k.checked_sub(1),
+                Side::Above => Some(k + 1),
+            };
+            let other = other.and_then(|k| edges.get(k)).map(|(_, place)| *place);
+            self.spec(edge, other, solid_fraction)
+        };
+        edges.iter().enumerate().map(of).collect()
     }
 
-    /// What it is joined from at an edge at a place along x (m).
+    /// What it is joined from at an edge, and at the other end of the same continuum if that has one, at places along x (m).
     fn spec(
         &self,
-        side: Side,
-        place: f64,
+        (side, place): (Side, f64),
+        other: Option<f64>,
         solid_fraction: f64,
     ) -> Result<MaterialEdgeSpec, Failure> {
         let scene = self.scene;
         let settings = scene.overlap_settings(&self.origin)?;
-        let [wall, back] = match side {
-            Side::Below => [scene.rest(); 2],
-            Side::Above => [scene.length(), scene.width()].map(|x| side.along(x)),
+        let overlap = settings.inner + settings.buffer;
+        let [wall, back] = match (side, other) {
+            (Side::Below, None) => [scene.rest(); 2],
+            (Side::Below, Some(other)) => [0.0, other - overlap],
+            (Side::Above, other) => {
+                let back = other.map_or(scene.width(), |other| other + overlap);
+                [scene.length(), back].map(|x| side.along(x))
+            }
         };
         Ok(MaterialEdgeSpec {
             case: CollapseCase {
@@ -208,13 +219,14 @@ impl<'a> JoinedColumn<'a> {
 
     /// What the edges are called in tables and summaries.
     fn names(&self) -> Vec<String> {
-        let edges = self.scene.edges();
-        let name = |(side, _): &(Side, f64)| match side {
-            _ if edges.len() == 1 => "edge".to_owned(),
-            Side::Below => "low_edge".to_owned(),
-            Side::Above => "high_edge".to_owned(),
+        let count = self.scene.edges().len();
+        let name = |k: usize| match (count, k) {
+            (1, _) => "edge".to_owned(),
+            (2, 0) => "low_edge".to_owned(),
+            (2, _) => "high_edge".to_owned(),
+            _ => format!("edge_{}", k + 1),
         };
-        edges.iter().map(name).collect()
+        (0..count).map(name).collect()
     }
 
     fn live(&self) -> MutexGuard<'_, Option<Live>> {
@@ -301,11 +313,15 @@ impl<'a> JoinedColumn<'a> {
             return Ok(());
         };
         let least = 0.5 * self.scene.spacing();
-        let reached = live.zone.edges().iter().fold(0.0, |most: f64, edge| {
-            let (x, h) = edge.continuum_heights();
-            let filled = x.iter().zip(&h).filter(|(_, h)| **h > least);
-            filled.fold(most, |most, (x, _)| most.max(*x))
-        });
+        let reached = live
+            .zone
+            .continua()
+            .iter()
+            .fold(0.0, |most: f64, continuum| {
+                let (x, h) = continuum.heights();
+                let filled = x.iter().zip(&h).filter(|(_, h)| **h > least);
+                filled.fold(most, |most, (x, _)| most.max(*x))
+            });
         if reached + least <= land.level_up_to() {
             return Ok(());
         }
@@ -349,11 +365,17 @@ impl Recipe for JoinedColumn<'_> {
             rest => format!(", of which {rest:.4} m rest and are not computed"),
         };
         let scene = self.scene;
-        let of = |(side, place): (Side, f64)| match side {
-            Side::Below => format!("within {place:.4} m of the wall is a continuum{rest}"),
-            Side::Above => format!("beyond {place:.4} m is a continuum"),
+        let of = |ends: [Option<f64>; 2]| match ends {
+            [Some(low), Some(high)] => {
+                format!("between {low:.4} and {high:.4} m from the wall is a continuum")
+            }
+            [Some(low), None] => format!("beyond {low:.4} m is a continuum"),
+            [None, high] => format!(
+                "within {:.4} m of the wall is a continuum{rest}",
+                high.unwrap_or(0.0)
+            ),
         };
-        let places: Vec<String> = scene.edges().into_iter().map(of).collect();
+        let places: Vec<String> = scene.continua().into_iter().map(of).collect();
         format!(
             "{}; what lies {}",
             scene.about(),

@@ -1,6 +1,8 @@
 //! A chute that is fed and open: from the scene to depths, speeds and the balance of volume.
 
+use super::channel;
 use super::collapse::options_of;
+use super::collapse_ground::contact;
 use super::surface_fields::SurfaceFields;
 use super::surface_run::{self, Course, Followed};
 use super::{Findings, Under};
@@ -10,19 +12,36 @@ use crate::summary::{Quantity, Summary};
 use crate::table::Table;
 use crate::vtkhdf::{Cells, Frame};
 use colluvium_continuum::Error;
-use colluvium_continuum::free_surface::{SurfaceState, SurfaceStep, flowing_shares};
-use colluvium_continuum::open_chute::{Feed, OpenChute, OpenChuteCase};
+use colluvium_continuum::free_surface::{
+    SurfaceOptions, SurfaceState, SurfaceStep, flowing_shares,
+};
+use colluvium_continuum::open_chute::{Across, Feed, OpenChute, OpenChuteCase, Sides, SpaceChute};
 use colluvium_continuum::rheology::ShearLaw;
 use colluvium_continuum::units::Units;
 
 /// What the continuum leaves out.
-pub const LEFT_OUT: [&str; 5] = [
+const LEFT_OUT: [&str; 5] = [
     "grains",
     "air",
     "dilatancy (constant solid fraction)",
     "the third dimension",
     "non-local effects near the base",
 ];
+/// The same in space.
+const LEFT_OUT_IN_SPACE: [&str; 4] = [
+    "grains",
+    "air",
+    "dilatancy (constant solid fraction)",
+    "non-local effects near the base and walls",
+];
+
+/// What the continuum of a scene leaves out.
+pub fn left_out(scene: &OpenChuteScene) -> &'static [&'static str] {
+    match scene.in_space {
+        None => &LEFT_OUT,
+        Some(_) => &LEFT_OUT_IN_SPACE,
+    }
+}
 
 /// The case that a scene describes, of a material with this law.
 fn case<L>(scene: &OpenChuteScene, rheology: L) -> OpenChuteCase<L> {
@@ -41,6 +60,28 @@ fn case<L>(scene: &OpenChuteScene, rheology: L) -> OpenChuteCase<L> {
     }
 }
 
+/// What the chute of a scene is across, if it is in space.
+pub fn across(scene: &OpenChuteScene) -> Option<Across> {
+    let keys = scene.in_space.as_ref()?;
+    Some(Across {
+        breadth: keys.breadth,
+        cells: scene.cells_across(keys),
+        whole: keys.whole || keys.walls.is_none(),
+        sides: match &keys.walls {
+            Some(walls) => Sides::Walls(contact(walls.contact, walls.friction)),
+            None => Sides::Periodic,
+        },
+    })
+}
+
+/// The solver's settings.
+pub fn options(scene: &OpenChuteScene) -> SurfaceOptions {
+    match scene.in_space {
+        None => options_of(&scene.solver),
+        Some(_) => channel::options(&scene.solver),
+    }
+}
+
 /// Checks the case, and says how fast the surface of what enters is (m/s).
 struct Check<'a> {
     scene: &'a OpenChuteScene,
@@ -52,7 +93,9 @@ impl LawVisitor for Check<'_> {
 
     fn visit<L: ShearLaw + Clone>(self, law: L) -> Self::Output {
         let case = case(self.scene, law);
+        let across = across(self.scene).map_or(Ok(()), |across| across.validate());
         case.validate()
+            .and(across)
             .map_err(|error| Failure::Input(format!("{}: {error}", self.origin)))?;
         Ok(case.speed(case.depth))
     }
@@ -71,19 +114,60 @@ pub fn entering_speed(scene: &Scene, body: &OpenChuteScene) -> Result<f64, Failu
 
 /// Checks the case and the settings before anything is written.
 pub(super) fn check(scene: &Scene, body: &OpenChuteScene) -> Result<(), Failure> {
-    options_of(&body.solver)
+    options(body)
         .validate()
         .map_err(|error| Failure::Input(format!("{}: {error}", scene.origin)))?;
     entering_speed(scene, body).map(drop)
 }
 
 /// A chute as a run follows it.
-struct Fed<'a, L: ShearLaw + Clone> {
-    chute: OpenChute<L>,
+struct Fed<'a, L: ShearLaw + Clone, const D: usize, const C: usize, const V: usize> {
+    chute: OpenChute<L, D, C, V>,
     scene: &'a OpenChuteScene,
 }
 
-impl<L: ShearLaw + Clone> Followed<2, 2> for Fed<'_, L> {
+/// What a chute shows in a plane and in space.
+trait Shown {
+    /// Cells with material, x along the chute and z normal to it, with their fields; d √ρ_s of the grains is given.
+    fn frame(&self, inertia: f64) -> Frame;
+    /// How far it is from its mirror image, if all of its breadth is computed.
+    fn asymmetry(&self) -> Option<f64>;
+}
+
+impl<L: ShearLaw + Clone> Shown for OpenChute<L> {
+    fn frame(&self, inertia: f64) -> Frame {
+        let cells = self.fields();
+        let fields = SurfaceFields::of_material(&cells, inertia);
+        Frame {
+            time: self.time(),
+            cells: Cells::Quadrilaterals,
+            points: fields.quadrilaterals().collect(),
+            fields: fields.of_plane(),
+        }
+    }
+
+    fn asymmetry(&self) -> Option<f64> {
+        None
+    }
+}
+
+impl<L: ShearLaw + Clone> Shown for SpaceChute<L> {
+    fn frame(&self, inertia: f64) -> Frame {
+        let cells = self.fields();
+        let fields = SurfaceFields::of_material(&cells, inertia);
+        fields.of_space(&[], self.time())
+    }
+
+    fn asymmetry(&self) -> Option<f64> {
+        self.is_whole().then(|| self.flow().asymmetry_across())
+    }
+}
+
+impl<L: ShearLaw + Clone, const D: usize, const C: usize, const V: usize> Followed<D, C>
+    for Fed<'_, L, D, C, V>
+where
+    OpenChute<L, D, C, V>: Shown,
+{
     fn units(&self) -> &Units {
         self.chute.units()
     }
@@ -92,11 +176,11 @@ impl<L: ShearLaw + Clone> Followed<2, 2> for Fed<'_, L> {
         self.chute.time()
     }
 
-    fn state(&self) -> &SurfaceState {
+    fn state(&self) -> &SurfaceState<D, C> {
         self.chute.flow().state()
     }
 
-    fn set_state(&mut self, state: SurfaceState) -> Result<(), Error> {
+    fn set_state(&mut self, state: SurfaceState<D, C>) -> Result<(), Error> {
         self.chute.set_state(state)
     }
 
@@ -126,21 +210,10 @@ impl<L: ShearLaw + Clone> Followed<2, 2> for Fed<'_, L> {
         flowing_shares(&self.chute.flow().cell_fields())
     }
 
-    /// Cells with material as quadrilaterals: x along the chute, z normal to it.
     fn frame(&self) -> Frame {
-        let cells = self.chute.fields();
         let grains = &self.scene.rheology;
-        let fields = SurfaceFields {
-            cells: &cells,
-            inertia: grains.diameter * grains.grain_density.sqrt(),
-            others: 0,
-        };
-        Frame {
-            time: self.chute.time(),
-            cells: Cells::Quadrilaterals,
-            points: fields.quadrilaterals().collect(),
-            fields: fields.of_plane(),
-        }
+        self.chute
+            .frame(grains.diameter * grains.grain_density.sqrt())
     }
 }
 
@@ -161,23 +234,37 @@ impl LawVisitor for Run<'_, '_, '_> {
     type Output = Result<Findings, Failure>;
 
     fn visit<L: ShearLaw + Clone>(self, law: L) -> Self::Output {
-        flow(&case(self.scene, law), self.scene, self.under)
+        let (scene, under) = (self.scene, self.under);
+        let (case, options) = (case(scene, law), options(scene));
+        let refused = |error: Error| Failure::Input(format!("{}: {error}", under.scene.origin));
+        match across(scene) {
+            None => {
+                let chute = OpenChute::new(&case, &options).map_err(refused)?;
+                flow(chute, &case, scene, under)
+            }
+            Some(across) => {
+                let chute = SpaceChute::in_space(&case, &across, &options).map_err(refused)?;
+                flow(chute, &case, scene, under)
+            }
+        }
     }
 }
 
-fn flow<L: ShearLaw + Clone>(
+fn flow<L: ShearLaw + Clone, const D: usize, const C: usize, const V: usize>(
+    chute: OpenChute<L, D, C, V>,
     case: &OpenChuteCase<L>,
     scene: &OpenChuteScene,
     under: &mut Under,
-) -> Result<Findings, Failure> {
-    let chute = OpenChute::new(case, &options_of(&scene.solver))
-        .map_err(|error| Failure::Input(format!("{}: {error}", under.scene.origin)))?;
+) -> Result<Findings, Failure>
+where
+    OpenChute<L, D, C, V>: Shown,
+{
     let end = scene.duration_scaled * chute.units().time();
     let mut fed = Fed { chute, scene };
     let course = surface_run::follow(&mut fed, end, under)?;
     let wall_s = under.wall_s();
     surface_run::join(&fed, end, under)?;
-    let mut summary = surface_run::summary(&fed, &course, &LEFT_OUT, under, wall_s);
+    let mut summary = surface_run::summary(&fed, &course, left_out(scene), under, wall_s);
     describe(&mut summary, case, &fed, &course);
     Ok(Findings {
         summary,
@@ -186,9 +273,9 @@ fn flow<L: ShearLaw + Clone>(
     })
 }
 
-fn tables<L: ShearLaw + Clone>(
+fn tables<L: ShearLaw + Clone, const D: usize, const C: usize, const V: usize>(
     case: &OpenChuteCase<L>,
-    chute: &OpenChute<L>,
+    chute: &OpenChute<L, D, C, V>,
     course: &Course,
 ) -> Vec<Table> {
     let (z, u) = chute.speeds();
@@ -210,12 +297,14 @@ fn tables<L: ShearLaw + Clone>(
     ]
 }
 
-fn describe<L: ShearLaw + Clone>(
+fn describe<L: ShearLaw + Clone, const D: usize, const C: usize, const V: usize>(
     summary: &mut Summary,
     case: &OpenChuteCase<L>,
-    fed: &Fed<L>,
+    fed: &Fed<L, D, C, V>,
     course: &Course,
-) {
+) where
+    OpenChute<L, D, C, V>: Shown,
+{
     let Fed { chute, scene } = fed;
     summary.remarks.extend(scene.rheology.remarks());
     let mut put = |name: &str, value: f64, unit: &str, source: &str| {
@@ -254,6 +343,14 @@ fn describe<L: ShearLaw + Clone>(
             (miss / size).sqrt(),
             "1",
             "relative L2 distance half way down from the steady profile of a layer as deep as what enters",
+        );
+    }
+    if let Some(asymmetry) = chute.asymmetry() {
+        put(
+            "symmetry_error",
+            asymmetry,
+            "1",
+            "largest difference of a cell's fraction from that of its mirror image across the chute",
         );
     }
     surface_run::describe_shares(summary, course);

@@ -4,7 +4,7 @@ use crate::vtkhdf::{Cells, Field, Frame, Values};
 use colluvium_continuum::discretisation::COMPONENTS;
 use colluvium_continuum::free_surface::{CellFields, SpaceFields};
 use colluvium_continuum::rheology::{MuI, strain_rate_norm};
-use colluvium_continuum::strain::deviator;
+use colluvium_continuum::strain::{SPACE_COMPONENTS, deviator};
 
 /// A field of that name and unit.
 pub(super) fn field(name: &str, unit: &str, values: Values) -> Field {
@@ -25,7 +25,16 @@ pub(super) struct SurfaceFields<'a, const D: usize, const C: usize> {
     pub others: usize,
 }
 
-impl<const D: usize, const C: usize> SurfaceFields<'_, D, C> {
+impl<'a, const D: usize, const C: usize> SurfaceFields<'a, D, C> {
+    /// Fields of material alone.
+    pub fn of_material(cells: &'a [CellFields<D, C>], inertia: f64) -> Self {
+        Self {
+            cells,
+            inertia,
+            others: 0,
+        }
+    }
+
     fn padded<T: Clone>(&self, nothing: T, of: &dyn Fn(&CellFields<D, C>) -> T) -> Vec<T> {
         let others = std::iter::repeat_n(nothing, self.others);
         self.cells.iter().map(of).chain(others).collect()
@@ -97,27 +106,35 @@ pub(super) fn space_frame(
         inertia: law.diameter * law.grain_density.sqrt(),
         others: ground.len(),
     };
-    let stresses = vec![
-        fields.scalars("deviatoric_stress_xx", "Pa", &|c| deviator(c.stress)[0]),
-        fields.scalars("deviatoric_stress_yy", "Pa", &|c| deviator(c.stress)[1]),
-        fields.scalars("shear_stress_xy", "Pa", &|c| c.stress[2]),
-        fields.scalars("shear_stress_xz", "Pa", &|c| c.stress[3]),
-        fields.scalars("shear_stress_yz", "Pa", &|c| c.stress[4]),
-    ];
-    let points = cells.iter().flat_map(corners);
-    let mut frame = Frame {
-        time,
-        cells: Cells::Hexahedra,
-        points: points.chain(ground.iter().flatten().copied()).collect(),
-        fields: fields.all(|velocity| velocity, stresses),
-    };
-    if !ground.is_empty() {
-        let [material, others] =
-            [(0, cells.len()), (1, ground.len())].map(|(n, count)| vec![n; count]);
-        let values = Values::Counts([material, others].concat());
-        frame.fields.push(field("ground", "1", values));
+    fields.of_space(ground, time)
+}
+
+impl SurfaceFields<'_, 3, SPACE_COMPONENTS> {
+    /// The cells as hexahedra with all fields of a flow in space, and blocks of ground behind them.
+    pub fn of_space(&self, ground: &[[[f64; 3]; 8]], time: f64) -> Frame {
+        let (fields, cells) = (self, self.cells);
+        let stresses = vec![
+            fields.scalars("deviatoric_stress_xx", "Pa", &|c| deviator(c.stress)[0]),
+            fields.scalars("deviatoric_stress_yy", "Pa", &|c| deviator(c.stress)[1]),
+            fields.scalars("shear_stress_xy", "Pa", &|c| c.stress[2]),
+            fields.scalars("shear_stress_xz", "Pa", &|c| c.stress[3]),
+            fields.scalars("shear_stress_yz", "Pa", &|c| c.stress[4]),
+        ];
+        let points = cells.iter().flat_map(corners);
+        let mut frame = Frame {
+            time,
+            cells: Cells::Hexahedra,
+            points: points.chain(ground.iter().flatten().copied()).collect(),
+            fields: fields.all(|velocity| velocity, stresses),
+        };
+        if !ground.is_empty() {
+            let [material, others] =
+                [(0, cells.len()), (1, ground.len())].map(|(n, count)| vec![n; count]);
+            let values = Values::Counts([material, others].concat());
+            frame.fields.push(field("ground", "1", values));
+        }
+        frame
     }
-    frame
 }
 
 /// Corners of a cell: round its base, then round its top.

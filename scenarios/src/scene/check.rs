@@ -31,21 +31,42 @@ struct Checker<'a> {
 }
 
 impl Checker<'_> {
-    /// Follows `$ref` and the one alternative of an optional value that is not null.
+    /// Follows `$ref` and the first alternative of an optional value that is not null.
     fn definition<'s>(&'s self, schema: &'s Value) -> &'s Value {
+        self.alternative(None, schema)
+    }
+
+    /// The same, where a value may be of several shapes: the alternative whose shape it has.
+    fn alternative<'s>(&'s self, value: Option<&toml::Value>, schema: &'s Value) -> &'s Value {
         if let Some(Value::String(path)) = schema.get("$ref") {
             let pointer = path.trim_start_matches('#');
-            return self
-                .root
-                .pointer(pointer)
-                .map_or(schema, |s| self.definition(s));
+            let found = self.root.pointer(pointer);
+            return found.map_or(schema, |found| self.alternative(value, found));
         }
-        if let Some(Value::Array(options)) = schema.get("anyOf")
-            && let Some(option) = options.iter().find(|o| o["type"] != "null")
-        {
-            return self.definition(option);
+        let Some(Value::Array(options)) = schema.get("anyOf") else {
+            return schema;
+        };
+        let mut options = options.iter().filter(|o| o["type"] != "null");
+        let fits = |o: &&Value| value.is_some_and(|value| self.has_shape(value, o));
+        match options.clone().find(fits).or(options.next()) {
+            Some(option) => self.alternative(value, option),
+            None => schema,
         }
-        schema
+    }
+
+    /// Whether a value is of the type of a schema, an array with its first value.
+    fn has_shape(&self, value: &toml::Value, schema: &Value) -> bool {
+        let schema = self.alternative(Some(value), schema);
+        match (value, kind(schema)) {
+            (toml::Value::Array(items), "array") => items
+                .first()
+                .is_none_or(|item| self.has_shape(item, &schema["items"])),
+            (toml::Value::Integer(_) | toml::Value::Float(_), "number" | "integer")
+            | (toml::Value::String(_), "string")
+            | (toml::Value::Boolean(_), "boolean")
+            | (toml::Value::Table(_), "object") => true,
+            _ => false,
+        }
     }
 
     fn table(&self, table: &toml::Table, schema: &Value, path: &str) -> Result<(), SceneError> {
@@ -104,7 +125,7 @@ impl Checker<'_> {
     }
 
     fn value(&self, value: &toml::Value, property: &Value, key: &str) -> Result<(), SceneError> {
-        let schema = self.definition(property);
+        let schema = self.alternative(Some(value), property);
         if let toml::Value::Table(inner) = value
             && kind(schema) == "object"
         {

@@ -1,9 +1,10 @@
 //! Keys of a column that is grains in front and a continuum behind, of the collapse with `model = "hybrid"`.
 
+use super::grain_intervals::{GrainIntervals, LEAST_GRAINS};
 use super::overlap_width::OverlapWidth;
 use super::world::Place;
 use super::{CollapseScene, SceneError};
-use colluvium_coupling::overlap::material_edge::{Side, Travel};
+use colluvium_coupling::overlap::material_edge::Travel;
 use colluvium_coupling::overlap::{NormalMotion, OverlapError, OverlapSettings, Resolved, Scales};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -17,9 +18,10 @@ pub struct ColumnZoneKeys {
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 50.0))]
     pub edge_scaled: Option<f64>,
     /// Low and high end of the grains along x (m), from the wall, instead of edge_scaled: continuum on both sides of them. At or
-    /// beyond the wall, or the foot of the column, grains reach up to it.
+    /// beyond the wall, or the foot of the column, grains reach up to it. A list of such intervals, rising, has continuum between
+    /// them: [[0, 1], [2.6, 99]] is grains at the wall and at the front, and a continuum with an edge at each end.
     #[serde(default, skip_serializing_if = "Option::is_none")]
-    pub x: Option<[f64; 2]>,
+    pub x: Option<GrainIntervals>,
     /// Distance over the column's height, from the wall, within which the material is not computed: it rests behind a
     /// smooth wall. Left out, it is computed; 0 computes all.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -215,9 +217,8 @@ const FLOWS: f64 = 0.8;
 const BEHIND: f64 = 1.5;
 /// Fewest grains beyond the overlap of an edge that moves.
 pub(super) const FEWEST_GRAINS: f64 = 50.0;
-/// Fewest diameters of continuum behind the edge, and of grains in front of the overlap.
+/// Fewest diameters of continuum behind the edge.
 const LEAST_CONTINUUM: f64 = 3.0;
-const LEAST_GRAINS: f64 = 4.0;
 
 /// Settings with nothing left out, or what is wrong with them by the keys that they have in a scene.
 pub(super) fn resolved(
@@ -256,20 +257,11 @@ pub(super) fn resolved(
 }
 
 impl CollapseScene {
-    /// Edges of the grains, on which side of them their continuum lies and their places along x (m), given or computed.
-    pub fn edges(&self) -> Vec<(Side, f64)> {
-        let Some([from, to]) = self.zones.x else {
-            return vec![(Side::Below, self.edge())];
-        };
-        let below = (from > 0.0).then_some((Side::Below, from));
-        let above = (to < self.width()).then_some((Side::Above, to));
-        below.into_iter().chain(above).collect()
-    }
-
     /// Distance from the wall of the edge that has its continuum there (m), given or computed; 0 without one.
     pub fn edge(&self) -> f64 {
-        match (self.zones.x, self.zones.edge_scaled) {
-            (Some([from, _]), _) => from.max(0.0),
+        let first = self.zones.x.as_ref().map(|x| x.list().first());
+        match (first, self.zones.edge_scaled) {
+            (Some(first), _) => first.map_or(0.0, |[from, _]| from.max(0.0)),
             (None, Some(scaled)) => scaled * self.height,
             (None, None) => {
                 let d = self.grains.diameter;
@@ -332,9 +324,9 @@ impl CollapseScene {
             return false;
         };
         let [least, most] = self.edge_range(settings.inner + settings.buffer);
-        let has_place = match self.zones.x {
+        let has_place = match &self.zones.x {
             None => (least..=most * (1.0 + 1e-12)).contains(&self.edge()),
-            Some(_) => self.check_interval("").is_ok(),
+            Some(_) => self.check_intervals("").is_ok(),
         };
         has_place && self.zones.tolerance.is_none() && self.terrain.is_none()
     }
@@ -369,7 +361,7 @@ impl CollapseScene {
             let range = "left out where zones.tolerance is given: the oracle puts the edge";
             return Err(at("zones").refuse("edge_scaled", edge, range));
         }
-        if let (Some(_), Some(edge)) = (zones.x, zones.edge_scaled) {
+        if let (Some(_), Some(edge)) = (&zones.x, zones.edge_scaled) {
             let range = "left out where zones.x is given";
             return Err(at("zones").refuse("edge_scaled", edge, range));
         }
@@ -380,12 +372,12 @@ impl CollapseScene {
             );
             return Err(at("zones").refuse("wake_speed_scaled", zones.wake_speed_scaled, range));
         }
-        if let Some(x) = zones.x {
+        if let Some(x) = &zones.x {
             if zones.tolerance.is_some() {
                 let range = "left out where zones.tolerance is given: the oracle puts one edge";
-                return Err(at("zones").refuse("x", format!("{x:?}"), range));
+                return Err(at("zones").refuse("x", x, range));
             }
-            self.check_interval(origin)?;
+            self.check_intervals(origin)?;
             return self.check_rest(least, origin);
         }
         if zones.tolerance.is_some() {
@@ -433,67 +425,6 @@ impl CollapseScene {
         if rest > most {
             let range = format!("[0, {most:.4}]: some continuum lies behind the edge");
             return Err(at.refuse("rest_scaled", rest, range));
-        }
-        Ok(())
-    }
-
-    /// What an interval of grains needs: continuum behind its edges, grains between their overlaps, a level floor under a
-    /// continuum that flows.
-    fn check_interval(&self, origin: &str) -> Result<(), SceneError> {
-        let Some([from, to]) = self.zones.x else {
-            return Ok(());
-        };
-        let settings = self.overlap_settings(origin)?;
-        let at = Place {
-            origin,
-            section: "zones",
-        };
-        let refuse = |range: String| Err(at.refuse("x", format!("[{from}, {to}]"), range));
-        let edges = self.edges();
-        let [least, _] = self.edge_range(0.0);
-        let width = self.width();
-        let grains = edges.len() as f64 * (settings.inner + settings.buffer)
-            + LEAST_GRAINS * self.grains.diameter;
-        if !(from.is_finite() && to.is_finite() && from < to) {
-            return refuse(
-                "[from, to] with from < to: grains lie between them and continuum on both sides; continuum between grains on \
-                 both sides is not joined"
-                    .into(),
-            );
-        }
-        if edges.is_empty() {
-            return refuse(format!(
-                "narrower than the column, which is {width:.4} m wide: it leaves no continuum (model = \"dem\")"
-            ));
-        }
-        for (side, place) in &edges {
-            let behind = match side {
-                Side::Below => *place,
-                Side::Above => width - place,
-            };
-            if behind < least * (1.0 - 1e-12) {
-                return refuse(format!(
-                    "at the end of the column (0 and {width:.4} m) or at least {least:.4} m from it: some continuum lies behind an edge"
-                ));
-            }
-        }
-        let [low, high] = [from.max(0.0), to.min(width)];
-        if high - low < grains * (1.0 - 1e-12) {
-            return refuse(format!(
-                "at least {grains:.4} m wide: {} of {:.4} m and {LEAST_GRAINS} diameters of grains",
-                if edges.len() > 1 {
-                    "two overlaps"
-                } else {
-                    "an overlap"
-                },
-                settings.inner + settings.buffer
-            ));
-        }
-        let flows = edges.iter().any(|(side, _)| *side == Side::Above);
-        if flows && (self.terrain.is_some() || self.overhang_degrees != 0.0) {
-            return refuse(format!(
-                "up to the foot of the column, {width:.4} m: with a terrain or overhang_degrees what runs out is grains"
-            ));
         }
         Ok(())
     }

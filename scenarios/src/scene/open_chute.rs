@@ -1,6 +1,7 @@
 //! Keys of a chute that is fed at its upper end and open at its lower one.
 
 use super::collapse::{check_rheology, out_of_range};
+use super::contact::SurfaceKeys;
 use super::{CollapseSolver, RheologyKeys, SceneError};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -30,6 +31,9 @@ pub struct OpenChuteScene {
     pub inflow: InflowKeys,
     /// The grid.
     pub grid: OpenChuteGrid,
+    /// The chute in space; a plane of any breadth without it.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub in_space: Option<AcrossKeys>,
     /// The solver.
     pub solver: CollapseSolver,
 }
@@ -63,11 +67,55 @@ pub struct OpenChuteGrid {
     pub room_scaled: f64,
 }
 
+/// What the chute is across, in space.
+#[derive(Clone, Debug, PartialEq, Serialize, Deserialize, JsonSchema)]
+#[serde(deny_unknown_fields)]
+pub struct AcrossKeys {
+    /// Distance of the side walls, or the period without them (m).
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e5))]
+    pub breadth: f64,
+    /// Cells across half of the chute at scale 1; across all of it if it is whole or periodic.
+    #[schemars(extend("minimum" = 1, "maximum" = 256))]
+    pub cells: u64,
+    /// Whether the grid holds all of it, instead of half of it beside a plane of symmetry.
+    #[serde(default)]
+    pub whole: bool,
+    /// Side walls, and what holds on them; without them the chute is periodic across.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    pub walls: Option<SurfaceKeys>,
+}
+
+/// Fewest cells over a period.
+const FEWEST_OF_PERIOD: u64 = 3;
+
+impl AcrossKeys {
+    fn check_together(&self, origin: &str) -> Result<(), SceneError> {
+        match &self.walls {
+            Some(walls) => walls.check_together(origin, "in_space.walls"),
+            None if self.whole => Err(out_of_range(
+                origin,
+                "in_space.whole",
+                "true".into(),
+                "left out without [in_space.walls]: all of a period is computed".into(),
+            )),
+            None if self.cells < FEWEST_OF_PERIOD => Err(out_of_range(
+                origin,
+                "in_space.cells",
+                self.cells.to_string(),
+                format!("at least {FEWEST_OF_PERIOD} without [in_space.walls]: of a period"),
+            )),
+            None => Ok(()),
+        }
+    }
+}
+
 /// Keys of which one is given.
 pub(super) const INFLOWS: &[&str] = &["inflow.bagnold_factor", "inflow.speed"];
 
 /// Most cells that hold material: their matrix has to fit into memory.
 const LARGEST_CHUTE: f64 = 200_000.0;
+/// The same in space.
+const LARGEST_IN_SPACE: f64 = 40_000.0;
 
 impl OpenChuteScene {
     /// Cells across the depth at this scale.
@@ -75,21 +123,35 @@ impl OpenChuteScene {
         (self.grid.cells as f64 * self.scale).round().max(4.0) as usize
     }
 
+    /// Cells across what is computed in space, at this scale.
+    pub fn cells_across(&self, keys: &AcrossKeys) -> usize {
+        let fewest = keys.walls.as_ref().map_or(FEWEST_OF_PERIOD, |_| 1);
+        (keys.cells as f64 * self.scale).round().max(fewest as f64) as usize
+    }
+
     /// Cells that hold material.
     pub fn filled(&self) -> f64 {
         let cells = self.cells() as f64;
-        cells * cells * self.grid.length_scaled
+        let across = self.in_space.as_ref().map_or(1, |k| self.cells_across(k));
+        cells * cells * self.grid.length_scaled * across as f64
     }
 
     pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {
+        if let Some(across) = &self.in_space {
+            across.check_together(origin)?;
+        }
         let filled = self.filled();
-        if filled > LARGEST_CHUTE {
+        let most = match self.in_space {
+            Some(_) => LARGEST_IN_SPACE,
+            None => LARGEST_CHUTE,
+        };
+        if filled > most {
             return Err(out_of_range(
                 origin,
                 "grid.cells",
                 self.grid.cells.to_string(),
                 format!(
-                    "at most {LARGEST_CHUTE} cells in the chute, here {filled:.0} at scale {} and grid.length_scaled = {}",
+                    "at most {most} cells in the chute, here {filled:.0} at scale {} and grid.length_scaled = {}",
                     self.scale, self.grid.length_scaled
                 ),
             ));

@@ -67,6 +67,14 @@ pub const INTERVAL: &[&str] = &[
     "zones.x=[0.8, 3.2]",
 ];
 
+/// With these grains lie at its wall and at its front, and a continuum between them.
+pub const CORE: &[&str] = &[
+    "aspect=0.25",
+    "grid.length_scaled=6",
+    "grains.packing=wide",
+    "zones.x=[[0, 1], [2.6, 99]]",
+];
+
 /// Every step of a continuum run stands in `steps.csv`, and what the summary says of the steps follows from it.
 pub fn steps_say_what_the_summary_says(run: &Path) {
     let (header, rows) = table(&run.join("steps.csv"));

@@ -47,8 +47,8 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                 faces_over(ground, &self.topology, fractions, acceleration, thin_layer)
             }
         };
-        if let Some(inflow) = &self.inflow {
-            inflow.open(&mut faces);
+        if let Some(ends) = &self.ends {
+            ends.open(&mut faces);
         }
         let material = Material {
             grid: &self.grid,
@@ -58,7 +58,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             shores: &self.shores,
             faces: &faces,
             side_walls: self.side_walls,
-            inflow: self.inflow.as_ref(),
+            ends: self.ends.as_ref(),
             acceleration,
             outside: self.outside.as_ref(),
             sliding: &self.sliding,
@@ -146,7 +146,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         let unknowns = &mut self.unknowns;
         let is_loose = self.bed.is_none()
             && self.outside.is_none()
-            && self.inflow.is_none()
+            && self.ends.is_none()
             && unknowns.p.iter().all(|p| *p <= f64::MIN_POSITIVE)
             && unknowns.s.iter().all(|s| *s == [0.0; C])
             && self.rheology.threshold(1.0, 0.0).stress == 0.0
@@ -224,8 +224,8 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         }
         self.state.history.drop_lead(faces);
         faces.spread(&self.unknowns.u, &mut self.state.velocity);
-        if let Some(inflow) = &self.inflow {
-            inflow.impose(&self.topology, &mut self.state.velocity);
+        if let Some(ends) = &self.ends {
+            ends.impose(&mut self.state.velocity[0]);
         }
         self.state.pressure.fill(INACTIVE);
         for (&cell, p) in faces.active.iter().zip(&self.unknowns.p) {

@@ -6,7 +6,7 @@ use crate::discretisation::COMPONENTS;
 use crate::error::{Error, require};
 use crate::free_surface::ground::shores::Shores;
 use crate::free_surface::ground::{Ground, Terrain};
-use crate::free_surface::open_ends::{Inflow, can_open};
+use crate::free_surface::open_ends::{Inflow, OpenEnds, can_open};
 use crate::free_surface::operators::POINTS;
 use crate::free_surface::sliding::SlidingPlaces;
 use crate::free_surface::topology::{NONE, Topology};
@@ -58,28 +58,6 @@ impl<R: Rheology> SurfaceFlow<R> {
         }
     }
 
-    /// The same flow with open ends along x: this flows in at the low one, and what comes to the high one flows
-    /// out. Both stand for smooth walls of the grid, over a floor that does not cut its cells.
-    ///
-    /// # Errors
-    /// An inflow that does not fit the grid, ends that are not smooth walls, or ground.
-    pub fn with_open_ends(mut self, inflow: Inflow) -> Result<Self, Error> {
-        let axis = &self.grid.axes()[0];
-        let ends = [0, axis.cells()].map(|face| axis.boundary_at(face));
-        let fits = self.bed.is_none() && ends.iter().all(|end| can_open(end.as_ref()));
-        require(
-            fits,
-            "inflow",
-            axis.spacing() * axis.cells() as f64,
-            "a grid of this length with smooth walls at both ends of x and a level floor",
-        )?;
-        inflow.validate(self.grid.axes()[1].cells())?;
-        inflow.impose(&self.topology, &mut self.state.velocity);
-        self.saved.clone_from(&self.state);
-        self.inflow = Some(inflow);
-        Ok(self)
-    }
-
     /// The same flow between side walls at a distance along y, in natural units: they rub on what
     /// moves with 2 c/W + (2 μ/W) p per volume.
     ///
@@ -114,6 +92,44 @@ impl<R: Rheology> SpaceFlow<R> {
 }
 
 impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R, D, C, V> {
+    /// The same flow with open ends along x: this flows in at the low one, and what comes to the high one flows
+    /// out. Both stand for smooth walls of the grid, over a floor that does not cut its cells.
+    ///
+    /// # Errors
+    /// An inflow that does not fit the grid, ends that are not smooth walls, or ground.
+    pub fn with_open_ends(self, inflow: Inflow) -> Result<Self, Error> {
+        let faces = self.grid.faces(0).iter().skip(1).product();
+        inflow.validate(faces)?;
+        self.opened(Some(inflow), &[0, 1])
+    }
+
+    /// The same flow, open at the high end of x only: what comes there flows out.
+    ///
+    /// # Errors
+    /// An end that is not a smooth wall, or ground.
+    pub fn with_open_outflow(self) -> Result<Self, Error> {
+        self.opened(None, &[1])
+    }
+
+    fn opened(mut self, inflow: Option<Inflow>, sides: &[usize]) -> Result<Self, Error> {
+        let axis = &self.grid.axes()[0];
+        let can_open = |&side: &usize| can_open(axis.boundary_at(side * axis.cells()).as_ref());
+        require(
+            self.bed.is_none() && sides.iter().all(can_open),
+            "inflow",
+            axis.spacing() * axis.cells() as f64,
+            "a grid of this length with smooth walls at the open ends of x and a level floor",
+        )?;
+        let ends = OpenEnds {
+            inflow,
+            columns: axis.cells(),
+        };
+        ends.impose(&mut self.state.velocity[0]);
+        self.saved.clone_from(&self.state);
+        self.ends = Some(ends);
+        Ok(self)
+    }
+
     /// Material at rest over ground, in natural units. Fractions are of whole cells, and at most what the
     /// ground leaves free of each. Ground that nowhere reaches into the grid, with what holds on the grid's floor, is
     /// that floor.
@@ -203,7 +219,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             side_walls: None,
             sliding,
             bed: None,
-            inflow: None,
+            ends: None,
             outside: None,
             untaken: [0.0; D],
             filled: Vec::new(),

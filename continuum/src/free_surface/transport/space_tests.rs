@@ -84,7 +84,7 @@ fn step(
         orders: &orders,
         incompressible: &incompressible,
         ground: None,
-        inflow: None,
+        ends: None,
     };
     transport.advance(&motion, fractions, velocity);
 }

@@ -76,7 +76,7 @@ fn step(
         orders: &[order],
         incompressible: &incompressible,
         ground: None,
-        inflow: None,
+        ends: None,
     };
     transport.advance(&motion, fractions, velocity);
 }

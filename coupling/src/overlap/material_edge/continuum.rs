@@ -1,145 +1,260 @@
-//! The continuum's side in SI units, cell by cell.
+//! A continuum that ends at grains on one side or on both.
+//!
+//! Its grid has one axis, that of one of its edges, the *keeper*: in the keeper's account stands what concerns the continuum as a
+//! whole, its weight and the steps that it makes. An edge at its other end sees it in a mirror, and what that one does to it is
+//! turned back where it is put together with what the keeper does. A cell bears the grains of that edge which has more of them there;
+//! forces of both are added.
 
+use super::account::{Account, Monitors};
 use super::cells::Cells;
-use crate::overlap::rest_stress::RestStress;
+use super::copy::ROUNDED;
+use super::side::{Side, mirror_rows};
+use super::{MaterialEdge, MaterialEdgeSpec, NEARLY, OverlapError, layout, start};
 use colluvium_continuum::column_collapse::Collapse;
 use colluvium_continuum::free_surface::SurfaceState;
+use colluvium_dem::GrainSample;
+use std::ops::Range;
 
-/// Cells fuller than this have a pressure of their own.
-const FULL: f64 = 0.5;
-/// Most by which the pressure of a cell at the surface is taken to be below the mean over its filled part.
-const LARGEST_FACTOR: f64 = 2.0;
-
-/// Fields of all cells (SI).
-#[derive(Clone, Debug, Default)]
-pub struct View {
-    /// Filled part.
-    pub fraction: Vec<f64>,
-    /// Velocity along x and z (m/s).
-    pub velocity: Vec<[f64; 2]>,
-    /// Pressure (Pa); negative where a cell has none.
-    pub pressure: Vec<f64>,
-    /// ((σ_xx − σ_zz)/2, σ_xz), positive in tension (Pa).
-    pub stress: Vec<[f64; 2]>,
-    /// What is remembered of the grains' rest.
-    pub rest: RestStress,
+/// What lies behind an edge, or between two. All along its keeper's axis.
+pub struct Continuum {
+    pub(super) spec: MaterialEdgeSpec,
+    pub(super) cells: Cells,
+    pub(super) collapse: Collapse,
+    /// Mass of it, copies included, and of what rests behind it (kg).
+    pub(super) mass: f64,
+    pub(super) rest_mass: f64,
+    /// Which edges of its zone are its own, and which of those is the keeper.
+    pub(super) edges: Range<usize>,
+    pub(super) keeper: usize,
 }
 
-impl View {
-    /// Looks at a collapse.
-    pub fn look(&mut self, collapse: &Collapse, cells: &Cells) {
-        let (state, units) = (collapse.flow().state(), collapse.units());
-        let points = state.stress.len() / state.fractions.len();
-        let (columns, stress) = (cells.counts[0], units.stress());
-        self.fraction.clone_from(&state.fractions);
-        self.pressure.clear();
-        self.pressure
-            .extend(state.pressure.iter().map(|p| p * stress));
-        self.velocity.clear();
-        self.stress.clear();
-        for cell in 0..cells.count() {
-            let (i, k) = (cell % columns, cell / columns);
-            let low = i + (columns + 1) * k;
-            let across = state.velocity[0][low] + state.velocity[0][low + 1];
-            let up = state.velocity[1][cell] + state.velocity[1][cell + columns];
-            self.velocity
-                .push([across, up].map(|sum| 0.5 * sum * units.velocity));
-            let own = &state.stress[cell * points..(cell + 1) * points];
-            self.stress.push(
-                [0, 1].map(|c| own.iter().map(|s| s[c]).sum::<f64>() / points as f64 * stress),
-            );
-        }
-    }
-
-    /// Whether a cell has a pressure of its own.
-    pub fn is_full(&self, cell: usize) -> bool {
-        self.fraction[cell] > FULL
-    }
-
-    /// Takes the shear of a time (s) into what is remembered: differences of velocities between full cells.
-    pub fn shear(&mut self, cells: &Cells, dt: f64) {
-        for cell in (0..cells.count()).filter(|cell| self.fraction[*cell] > FULL) {
-            let [[ux, wx], [uz, wz]] = self.gradient(cells, cell);
-            let strain = &mut self.rest.strain[cell];
-            strain[0] += (ux - wz) * dt;
-            strain[1] += (uz + wx) * dt;
-        }
-    }
-
-    /// ∂(u, w)/∂x and ∂(u, w)/∂z of a cell (1/s), from differences between the full cells beside it.
-    fn gradient(&self, cells: &Cells, cell: usize) -> [[f64; 2]; 2] {
-        let [columns, rows] = cells.counts;
-        let slope = |index: usize, count: usize, step: usize| {
-            let full = |is_there: bool, to: usize| match is_there && self.is_full(to) {
-                true => to,
-                false => cell,
-            };
-            let low = full(index > 0, cell.wrapping_sub(step));
-            let high = full(index + 1 < count, cell + step);
-            let steps = ((high - low) / step).max(1) as f64;
-            let change = |axis: usize| self.velocity[high][axis] - self.velocity[low][axis];
-            [0, 1].map(|axis| change(axis) / (steps * cells.spacing))
+impl Continuum {
+    /// Of grains that lie where it will be, seen along its keeper's axis.
+    pub(super) fn of_grains<'a>(
+        specs: &[MaterialEdgeSpec],
+        edges: Range<usize>,
+        grains: impl Iterator<Item = &'a GrainSample>,
+        timestep: f64,
+    ) -> Result<Self, OverlapError> {
+        let spec = specs[layout::keeper(specs, &edges)];
+        let [_, inner] = spec.zones();
+        // With grains on both sides of it, those on the far side are not its own.
+        let begins = match edges.len() > 1 {
+            true => spec.back,
+            false => f64::NEG_INFINITY,
         };
-        [
-            slope(cell % columns, columns, 1),
-            slope(cell / columns, rows, columns),
-        ]
-    }
-
-    /// Rotation rate of the material about y, (∂u/∂z − ∂w/∂x)/2 (1/s).
-    pub fn rotation(&self, cells: &Cells, cell: usize) -> f64 {
-        let [[_, wx], [uz, _]] = self.gradient(cells, cell);
-        0.5 * (uz - wx)
-    }
-
-    /// Velocity at a place from the full cells around it; none without any.
-    pub fn velocity_at(&self, hats: &[(usize, f64); 4]) -> Option<[f64; 2]> {
-        let (mut sum, mut weight) = ([0.0; 2], 0.0);
-        for &(cell, hat) in hats.iter().filter(|(cell, _)| self.is_full(*cell)) {
-            weight += hat;
-            for (sum, u) in sum.iter_mut().zip(self.velocity[cell]) {
-                *sum += hat * u;
+        let (mut behind, mut before) = (0.0, 0.0);
+        for grain in grains {
+            if grain.position.x < spec.wall {
+                behind += grain.mass;
+            } else if grain.position.x - spec.place < inner && grain.position.x >= begins {
+                before += grain.mass;
             }
         }
-        (weight > 0.0).then(|| sum.map(|s| s / weight))
+        Self::standing(specs, edges, [before, behind], timestep)
     }
 
-    /// Filled part, σ_xx with what is remembered, σ_zz, σ_xz (Pa) and velocity at a place in a row, from the cells beside it;
-    /// none where neither is full.
-    pub fn across(&self, cells: &Cells, x: f64, row: usize) -> Option<(f64, [f64; 3], [f64; 2])> {
-        let columns = cells.counts[0];
-        let place = cells.offset(x);
-        let low = place.floor();
-        let share = place - low;
-        let index = |n: i64| (low as i64 + n).clamp(0, columns as i64 - 1) as usize + columns * row;
-        let (mut weight, mut fraction) = (0.0, 0.0);
-        let (mut sigma, mut velocity) = ([0.0; 3], [0.0; 2]);
-        for (cell, hat) in [(index(0), 1.0 - share), (index(1), share)] {
-            if !self.is_full(cell) {
-                continue;
-            }
-            weight += hat;
-            let f = self.fraction[cell].min(1.0);
-            fraction += hat * f;
-            let above = cell + columns;
-            let at_surface = above >= cells.count() || !self.is_full(above);
-            // Linear from the centre to the surface, over the filled part.
-            let factor = match at_surface {
-                true => (f / (2.0 * f - 1.0)).min(LARGEST_FACTOR),
-                false => 1.0,
-            };
-            let (p, [s, tau]) = (factor * self.pressure[cell].max(0.0), self.stress[cell]);
-            let zz = -s - p;
-            let xx = self.rest.of_grains(cell, s - p, zz);
-            for (sum, part) in sigma.iter_mut().zip([xx, zz, tau]) {
-                *sum += hat * part;
-            }
-            for (sum, u) in velocity.iter_mut().zip(self.velocity[cell]) {
-                *sum += hat * u;
-            }
+    /// Of a mass, and another that rests behind it (kg), before anything moves.
+    pub(super) fn standing(
+        specs: &[MaterialEdgeSpec],
+        edges: Range<usize>,
+        [mass, rest_mass]: [f64; 2],
+        timestep: f64,
+    ) -> Result<Self, OverlapError> {
+        let keeper = layout::keeper(specs, &edges);
+        let spec = specs[keeper];
+        let steps = MaterialEdge::steps_of_loads(&spec.settings, timestep);
+        let load_time = steps as f64 * timestep;
+        let loads = MaterialEdge::loads_of_exchange(&spec.settings, timestep);
+        let column = spec.column(mass);
+        let exchange = loads as f64 * load_time / (column.height / column.gravity).sqrt();
+        // The copy is made anew at every exchange.
+        let mut options = spec.options.of_first_order();
+        if exchange < NEARLY * options.largest_step {
+            options.largest_step = options.largest_step.max(ROUNDED * exchange);
         }
-        let mean = |sum: f64| sum / weight;
-        (weight > 0.0).then(|| (mean(fraction), sigma.map(mean), velocity.map(mean)))
+        let collapse = start::column(&spec, &column, &options)?;
+        let axes = collapse.flow().grid().axes();
+        let cells = Cells {
+            counts: [axes[0].cells(), axes[1].cells()],
+            low: spec.wall,
+            spacing: spec.spacing(),
+            slab: spec.slab,
+        };
+        Ok(Self {
+            spec,
+            cells,
+            collapse,
+            mass,
+            rest_mass,
+            keeper: keeper - edges.start,
+            edges,
+        })
+    }
+
+    /// Where the column of the continuum has come to.
+    pub fn collapse(&self) -> &Collapse {
+        &self.collapse
+    }
+
+    /// Its grid.
+    pub fn cells(&self) -> &Cells {
+        &self.cells
+    }
+
+    /// What its keeper was made from.
+    pub fn spec(&self) -> &MaterialEdgeSpec {
+        &self.spec
+    }
+
+    /// Its keeper among its edges, and the other one.
+    pub(super) fn parted<'e>(
+        &self,
+        edges: &'e [MaterialEdge],
+    ) -> Option<(&'e MaterialEdge, Option<&'e MaterialEdge>)> {
+        let keeper = edges.get(self.keeper)?;
+        Some((keeper, edges.get(1 - self.keeper)))
+    }
+
+    /// Its grid along the axis of an edge.
+    pub(super) fn cells_along(&self, side: Side) -> Cells {
+        match self.spec.side.seen_along(side) {
+            Side::Below => self.cells,
+            Side::Above => Cells {
+                low: -self.cells.face(self.cells.counts[0]),
+                ..self.cells
+            },
+        }
+    }
+
+    /// Turns fractions and velocities of a state onto the axis of an edge; and back.
+    pub(super) fn turn(&self, side: Side, state: &mut SurfaceState) {
+        if self.spec.side == side {
+            return;
+        }
+        let columns = self.cells.counts[0];
+        mirror_rows(&mut state.fractions, columns);
+        mirror_rows(&mut state.velocity[0], columns + 1);
+        mirror_rows(&mut state.velocity[1], columns);
+        for u in &mut state.velocity[0] {
+            *u = -*u;
+        }
+    }
+
+    /// Momentum along x and z, copies included (N s).
+    pub(super) fn momentum(&self) -> [f64; 2] {
+        let unit = self.impulse_unit();
+        self.spec
+            .side
+            .in_plane(self.collapse.flow().momentum().map(|p| p * unit))
+    }
+
+    /// ρ U L² W (N s).
+    fn impulse_unit(&self) -> f64 {
+        let u = self.collapse.units();
+        u.density * u.velocity * u.length * u.length * self.spec.slab
+    }
+
+    /// What follows the steps of the grains for which loads are held: books what they gave, and exchanges where it is time
+    /// to. Says whether it was.
+    ///
+    /// # Errors
+    /// If the continuum's step fails.
+    pub(super) fn go_on(
+        &mut self,
+        edges: &mut [MaterialEdge],
+        simulation: &mut colluvium_dem::Simulation,
+    ) -> Result<bool, OverlapError> {
+        let mut is_time = false;
+        for edge in edges.iter_mut() {
+            edge.book_grains(simulation);
+            edge.made += 1;
+            is_time = edge.made >= edge.loads_of_exchange;
+        }
+        if !is_time {
+            return Ok(false);
+        }
+        let exchange = edges.first().map_or(0, |edge| edge.exchanges + 1);
+        for edge in edges.iter_mut() {
+            edge.take_up(self, simulation)?;
+        }
+        self.step(edges, exchange)?;
+        for edge in edges {
+            edge.see_the_step();
+            edge.made = 0;
+            edge.exchanges = exchange;
+            edge.renew_labels();
+        }
+        Ok(true)
+    }
+
+    /// Steps up to the end of an exchange, the first being 1, under what its edges do to it.
+    pub(super) fn step(
+        &mut self,
+        edges: &mut [MaterialEdge],
+        exchange: u64,
+    ) -> Result<(), OverlapError> {
+        let (keeper, mut other) = match (edges, self.keeper) {
+            ([keeper], _) => (keeper, None),
+            ([keeper, other], 0) | ([other, keeper], _) => (keeper, Some(other)),
+            _ => return Ok(()),
+        };
+        let units = self.collapse.units();
+        let unit = units.time();
+        let dt = keeper.exchange_time();
+        let until = exchange as f64 * dt;
+        let coupled = !self.spec.settings.uncoupled;
+        if coupled {
+            keeper.press_on_continuum(units, dt);
+            if let Some(other) = &mut other {
+                other.press_on_continuum(units, dt);
+                keeper.press_with(other);
+            }
+            let flow = self.collapse.flow_mut();
+            flow.set_outside(keeper.outside.clone())?;
+        }
+        let before = self.collapse.flow().state().velocity_time;
+        while self.collapse.time() < until * (1.0 - 1e-12) {
+            let step = self.collapse.step(until)?;
+            let seen: &mut Monitors = &mut keeper.monitors;
+            seen.steps[0] += 1.0;
+            seen.steps[1] += step.active_cells as f64;
+            seen.newton[0] += step.newton_iterations as f64;
+            seen.newton[1] += step.cuts as f64;
+            seen.residual = seen.residual.max(step.residuals.momentum);
+        }
+        // Velocities have moved on by this, half a step ahead of the fractions.
+        let pushed = (self.collapse.flow().state().velocity_time - before) * unit;
+        let unit = self.impulse_unit();
+        let untaken = self.collapse.flow_mut().take_untaken();
+        let account: &mut Account = &mut keeper.account;
+        for (sum, untaken) in account.untaken.iter_mut().zip(untaken) {
+            *sum += untaken * unit;
+        }
+        let mass = self.collapse.flow().volume() * unit / self.collapse.units().velocity;
+        account.continuum_weight[1] -= mass * self.spec.case.gravity * pushed;
+        for edge in std::iter::once(keeper).chain(other) {
+            if coupled {
+                edge.answer(pushed / dt);
+            }
+            edge.look_at(self);
+        }
+        Ok(())
+    }
+
+    /// A step that is taken back but for its stress and pressure, for grains to meet at once.
+    pub(super) fn prime(&mut self, edges: &mut [MaterialEdge]) -> Result<(), OverlapError> {
+        for edge in edges.iter_mut() {
+            edge.look_at(self);
+        }
+        let before = self.collapse.flow().state().clone();
+        let books: Vec<_> = edges.iter().map(|e| (e.account, e.monitors)).collect();
+        self.step(edges, 1)?;
+        self.collapse.set_state(before)?;
+        for (edge, book) in edges.iter_mut().zip(books) {
+            (edge.account, edge.monitors) = book;
+        }
+        Ok(())
     }
 }
 

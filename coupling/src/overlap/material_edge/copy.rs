@@ -11,8 +11,8 @@
 //! and momentum that this adds are booked. Between two exchanges matter does come loose from the copy's end, by little and
 //! fast; it is made anew before it gets anywhere, and the next step's length must not remember how fast it was.
 
-use super::MaterialEdge;
 use super::cells::over;
+use super::{Continuum, MaterialEdge, OverlapError};
 
 /// A step planned as long as an exchange but for round-off would be made in two halves.
 pub(super) const ROUNDED: f64 = 1.0 + 1e-6;
@@ -21,12 +21,19 @@ const LEAST: f64 = 0.05;
 
 impl MaterialEdge {
     /// Makes the copy anew, after a time (s) with the last one.
-    pub(super) fn copy_the_grains(&mut self, dt: f64) -> Result<(), super::OverlapError> {
-        let before = (self.collapse.flow().volume(), self.continuum_momentum());
+    pub(super) fn copy_the_grains(
+        &mut self,
+        continuum: &mut Continuum,
+        dt: f64,
+    ) -> Result<(), OverlapError> {
+        let side = self.spec.side;
+        let before = continuum.collapse.flow().volume();
+        let momentum_before = side.in_plane(continuum.momentum());
         let [columns, rows] = self.cells.counts;
-        let mut state = self.collapse.flow().state().clone();
+        let mut state = continuum.collapse.flow().state().clone();
+        continuum.turn(side, &mut state);
         let full = self.spec.density() * self.cells.volume();
-        let unit = self.collapse.units().velocity;
+        let units = *continuum.collapse.units();
         let is_copy = |cell: usize| {
             let (i, k) = (cell % columns, cell / columns);
             self.cells.face(i) >= self.held.handshake[k]
@@ -69,21 +76,24 @@ impl MaterialEdge {
                     *u = 0.0;
                     continue;
                 }
-                let mean = (covers[0].momentum[axis] + covers[1].momentum[axis]) / mass / unit;
+                let mean =
+                    (covers[0].momentum[axis] + covers[1].momentum[axis]) / mass / units.velocity;
                 let is_inside = pair.into_iter().any(|cell| state.fractions[cell] > 0.5);
                 *u += if is_inside { part } else { 1.0 } * (mean - *u);
             }
         }
-        self.collapse.set_state(state)?;
-        let exchange = self.exchange_time() / self.collapse.units().time();
-        self.collapse.flow_mut().renew_step(ROUNDED * exchange);
-        self.account.copied += self.collapse.flow().volume() - before.0;
-        let now = self.continuum_momentum();
-        let changes = now.iter().zip(before.1);
+        continuum.turn(side, &mut state);
+        let collapse = &mut continuum.collapse;
+        collapse.set_state(state)?;
+        let exchange = self.exchange_time() / units.time();
+        collapse.flow_mut().renew_step(ROUNDED * exchange);
+        self.account.copied += collapse.flow().volume() - before;
+        let now = side.in_plane(continuum.momentum());
+        let changes = now.iter().zip(momentum_before);
         for (sum, (now, before)) in self.account.following.iter_mut().zip(changes) {
             *sum += now - before;
         }
-        self.view.look(&self.collapse, &self.cells);
+        self.look_at(continuum);
         Ok(())
     }
 }

@@ -3,8 +3,9 @@
 use super::cells::over;
 use super::embedded::Embedded;
 use super::rows::{Load, Row, bearers, slopes};
-use super::{MaterialEdge, OverlapError};
+use super::{Continuum, MaterialEdge, OverlapError, Side};
 use crate::overlap::angular::{AngularBook, Counterpart, Parts};
+use colluvium_continuum::units::Units;
 use colluvium_dem::{GrainSample, Load as Laid, Simulation};
 use nalgebra::Vector3;
 
@@ -37,24 +38,6 @@ fn in_slab([x, z]: [f64; 2]) -> Vector3<f64> {
 }
 
 impl MaterialEdge {
-    /// What follows the steps of the grains for which loads are held: books what they gave, and exchanges where it is time
-    /// to. Says whether it was.
-    ///
-    /// # Errors
-    /// If the continuum's step fails.
-    pub(super) fn go_on(&mut self, simulation: &mut Simulation) -> Result<bool, OverlapError> {
-        self.book_grains(simulation);
-        self.made += 1;
-        if self.made < self.loads_of_exchange {
-            return Ok(false);
-        }
-        self.exchange(simulation)?;
-        self.made = 0;
-        self.exchanges += 1;
-        self.renew_labels();
-        Ok(true)
-    }
-
     /// Books the impulses of what was laid over the steps made since.
     pub(super) fn book_grains(&mut self, simulation: &Simulation) {
         let time = self.acting(simulation);
@@ -244,8 +227,12 @@ impl MaterialEdge {
         }
     }
 
-    /// Averages of the grains to the continuum, its step, and what it does to the grains until the next exchange.
-    fn exchange(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
+    /// Averages of the grains to the continuum, and its copy of them, before its step.
+    pub(super) fn take_up(
+        &mut self,
+        continuum: &mut Continuum,
+        simulation: &mut Simulation,
+    ) -> Result<(), OverlapError> {
         let dt = self.exchange_time();
         self.look(simulation);
         self.sum_up(-(-dt / self.spec.settings.stress_time).exp_m1());
@@ -262,13 +249,16 @@ impl MaterialEdge {
         }
         self.given.clear();
         if !self.spec.settings.uncoupled {
-            self.copy_the_grains(dt)?;
+            self.copy_the_grains(continuum, dt)?;
         }
-        self.step_continuum(dt, self.exchanges + 1)?;
-        self.view.shear(&self.cells, dt);
+        Ok(())
+    }
+
+    /// What the continuum does to the grains until the next exchange, after its step.
+    pub(super) fn see_the_step(&mut self) {
+        self.view.shear(&self.cells, self.exchange_time());
         self.agree();
         self.watch();
-        Ok(())
     }
 
     /// Sums of the grains over the cells, stresses taken into their averages with this weight.
@@ -292,9 +282,8 @@ impl MaterialEdge {
         self.spec.density() * self.cells.volume()
     }
 
-    /// Puts together what acts on the continuum for a time (s).
-    fn press_on_continuum(&mut self, dt: f64) {
-        let units = self.collapse.units();
+    /// Puts together what acts on the continuum, of these units, for a time (s).
+    pub(super) fn press_on_continuum(&mut self, units: &Units, dt: f64) {
         let (stress, force) = (
             1.0 / units.stress(),
             1.0 / (units.stress() * units.length * self.spec.slab),
@@ -318,55 +307,41 @@ impl MaterialEdge {
         }
     }
 
-    /// Steps of the continuum up to the end of an exchange.
-    fn step_continuum(&mut self, dt: f64, exchanges: u64) -> Result<(), OverlapError> {
-        let unit = self.collapse.units().time();
-        let until = exchanges as f64 * dt;
-        let coupled = !self.spec.settings.uncoupled;
-        if coupled {
-            self.press_on_continuum(dt);
-            self.collapse.flow_mut().set_outside(self.outside.clone())?;
-        }
-        let before = self.collapse.flow().state().velocity_time;
-        while self.collapse.time() < until * (1.0 - 1e-12) {
-            let step = self.collapse.step(until)?;
-            self.monitors.steps[0] += 1.0;
-            self.monitors.steps[1] += step.active_cells as f64;
-            self.monitors.newton[0] += step.newton_iterations as f64;
-            self.monitors.newton[1] += step.cuts as f64;
-            self.monitors.residual = self.monitors.residual.max(step.residuals.momentum);
-        }
-        // Velocities have moved on by this, half a step ahead of the fractions.
-        let pushed = (self.collapse.flow().state().velocity_time - before) * unit;
-        let unit = self.impulse_unit();
-        let untaken = self.collapse.flow_mut().take_untaken();
-        for (sum, untaken) in self.account.untaken.iter_mut().zip(untaken) {
-            *sum += untaken * unit;
-        }
-        let mass = self.collapse.flow().volume() * unit / self.collapse.units().velocity;
-        self.account.continuum_weight[1] -= mass * self.spec.case.gravity * pushed;
-        if coupled {
-            for owed in &mut self.owed {
-                for (axis, owed) in owed.iter_mut().enumerate() {
-                    let answer = *owed * (pushed / dt);
-                    *owed -= answer;
-                    self.account.answer[axis] += answer;
-                }
+    /// Puts what another edge of the same continuum does to it, which sees it in a mirror, together with its own: a cell bears the
+    /// grains of the edge that has more of them there.
+    pub(super) fn press_with(&mut self, other: &Self) {
+        let columns = self.cells.counts[0];
+        for cell in 0..self.cells.count() {
+            let turned = cell - cell % columns + columns - 1 - cell % columns;
+            let (own, more) = (&mut self.outside, &other.outside);
+            if other.sums.cover[turned].mass > self.sums.cover[cell].mass {
+                own.pressure[cell] = more.pressure[turned];
+                own.cover[cell] = more.cover[turned];
+                own.share[cell] = more.share[turned];
+                own.stress[cell] = Side::Above.stress(more.stress[turned]);
+            }
+            let force = Side::Above.in_plane(more.force[turned]);
+            for (sum, force) in own.force[cell].iter_mut().zip(force) {
+                *sum += force;
             }
         }
-        self.view.look(&self.collapse, &self.cells);
-        Ok(())
     }
 
-    /// A step of the continuum that is taken back but for its stress and pressure, for grains to meet at once.
-    pub(super) fn prime(&mut self) -> Result<(), OverlapError> {
-        self.view.look(&self.collapse, &self.cells);
-        let before = self.collapse.flow().state().clone();
-        let (account, monitors) = (self.account, self.monitors);
-        self.step_continuum(self.exchange_time(), 1)?;
-        self.collapse.set_state(before)?;
-        (self.account, self.monitors) = (account, monitors);
-        Ok(())
+    /// Books that the continuum has taken this part of what it owed.
+    pub(super) fn answer(&mut self, part: f64) {
+        for owed in &mut self.owed {
+            for (axis, owed) in owed.iter_mut().enumerate() {
+                let answer = *owed * part;
+                *owed -= answer;
+                self.account.answer[axis] += answer;
+            }
+        }
+    }
+
+    /// Looks at its continuum along its own axis.
+    pub(super) fn look_at(&mut self, continuum: &Continuum) {
+        let as_seen = continuum.spec.side.seen_along(self.spec.side);
+        self.view.look(&continuum.collapse, &self.cells, as_seen);
     }
 
     /// Slips between both sides, with the same hats at the grains' own places.

@@ -42,6 +42,12 @@ impl Labels {
         label.filter(|label| *label < NO_LABEL && !grain.fixed)
     }
 
+    /// The label that a grain was given; none of what never had one.
+    pub fn given_to(&mut self, grain: u32) -> Option<&mut f64> {
+        let label = self.given.get_mut(grain as usize);
+        label.filter(|label| **label < NO_LABEL)
+    }
+
     /// Where the surface of a label is, row by row (m): its place at the start, moved by the mean displacement of
     /// the grains of nearby labels.
     pub fn surface(

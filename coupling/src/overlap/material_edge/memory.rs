@@ -1,16 +1,21 @@
-//! All of an edge as numbers: what a run goes on from with the same bits.
+//! All of a zone as numbers: what a run goes on from with the same bits.
 //!
 //! In front stands what every load changes, of a length that does not; behind it what an exchange changes, in rows
-//! with their lengths before them.
+//! with their lengths before them. A continuum stands with its keeper.
 
 use super::account::{self, Account, Monitors};
 use super::rows::{self, Row};
 use super::travel::{Journey, Move};
-use super::{MaterialEdge, MaterialEdgeSpec, OverlapError, continuum};
+use super::{
+    Continuum, GrainZone, MaterialEdge, MaterialEdgeSpec, OverlapError, continuum, layout,
+};
 use colluvium_continuum::strain::SPACE_COMPONENTS;
 use colluvium_dem::{Patch, Simulation};
+use std::ops::Range;
 
-/// Numbers in front but for the rows of forces and moments by cell, the account among them.
+/// Numbers in front of those of the edges, with the lengths of which they end: how many there are, and steps of grains.
+const HEAD: usize = 2 + account::NUMBERS;
+/// Numbers in front of an edge's but for the rows of forces and moments by cell, the account among them.
 const FRONT: usize = 17 + account::NUMBERS;
 
 impl MaterialEdge {
@@ -34,13 +39,13 @@ impl MaterialEdge {
     }
 
     /// Writes what has changed since an exchange over what [`write`](Self::write) wrote after it.
-    pub(super) fn write_over(&self, memory: &mut [f64]) {
+    fn write_over(&self, memory: &mut [f64]) {
         let front = self.front();
         memory[..front.len()].copy_from_slice(&front);
     }
 
-    /// Appends all there is; to be called after every exchange.
-    pub(super) fn write(&self, memory: &mut Vec<f64>) {
+    /// Appends all there is, with the continuum if it keeps it.
+    fn write(&self, continuum: &Continuum, keeps: bool, memory: &mut Vec<f64>) {
         memory.extend(self.front());
         let mut put = |row: &[f64]| {
             memory.push(row.len() as f64);
@@ -48,8 +53,8 @@ impl MaterialEdge {
         };
         put(&[
             self.exchanges as f64,
-            self.continuum_mass,
-            self.rest_mass,
+            continuum.mass,
+            continuum.rest_mass,
             self.held.reach,
         ]);
         put(&self.monitors.numbers());
@@ -78,26 +83,17 @@ impl MaterialEdge {
         put(self.owed.as_flattened());
         put(&[self.view.rest.ratio]);
         put(self.view.rest.strain.as_flattened());
-        continuum::write(self.collapse.flow().state(), &mut put);
+        if keeps {
+            continuum::write(continuum.collapse.flow().state(), &mut put);
+        }
     }
 
-    /// Goes on from what was written of an edge with the same specification; the simulation is the one that was
-    /// joined, resumed itself.
-    ///
-    /// # Errors
-    /// If the numbers do not belong to this specification.
-    pub(super) fn read(
-        spec: MaterialEdgeSpec,
-        memory: &[f64],
-        simulation: &Simulation,
-    ) -> Result<Self, OverlapError> {
-        Self::read_back(spec, memory, simulation)?
-            .ok_or_else(|| OverlapError::Record("an edge's memory misses a part".into()))
-    }
-
+    /// From what was written of an edge; its keeper's continuum is made before the other edge is read.
     fn read_back(
-        spec: MaterialEdgeSpec,
+        (specs, k): (&[MaterialEdgeSpec], usize),
+        ours: [f64; 2],
         memory: &[f64],
+        (own, known): (Range<usize>, &mut Option<Continuum>),
         simulation: &Simulation,
     ) -> Result<Option<Self>, OverlapError> {
         let cells = memory.first().map_or(0, |cells| *cells as usize);
@@ -120,7 +116,17 @@ impl MaterialEdge {
         let Some(labels) = take() else {
             return Ok(None);
         };
-        let mut edge = Self::around(spec, [mass, rest_mass], labels.to_vec(), simulation)?;
+        let keeps = known.is_none();
+        let continuum = match known {
+            Some(continuum) => continuum,
+            None => known.insert(Continuum::standing(
+                specs,
+                own,
+                [mass, rest_mass],
+                simulation.timestep(),
+            )?),
+        };
+        let mut edge = Self::around(specs[k], ours, continuum, labels.to_vec(), simulation);
         let Some(base) = take() else {
             return Ok(None);
         };
@@ -155,9 +161,10 @@ impl MaterialEdge {
         let Some((&[ratio], strain)) = take().zip(take()) else {
             return Ok(None);
         };
-        let Some(state) = continuum::read(&mut take) else {
+        let state = keeps.then(|| continuum::read(&mut take));
+        if state.as_ref().is_some_and(Option::is_none) {
             return Ok(None);
-        };
+        }
         let fits = stress.len() == 3 * cells
             && accelerations.len() == 2 * cells
             && spins.len() == cells
@@ -196,10 +203,94 @@ impl MaterialEdge {
         }
         edge.laid.powers = [scalars[14], scalars[15], scalars[16]];
         edge.account = Account::of(account);
-        edge.collapse.set_state(state)?;
-        edge.view.look(&edge.collapse, &edge.cells);
+        if let Some(state) = state.flatten() {
+            continuum.collapse.set_state(state)?;
+        }
+        edge.look_at(continuum);
         edge.view.rest.ratio = ratio;
         edge.view.rest.strain = strain.as_chunks().0.to_vec();
         Ok(Some(edge))
+    }
+}
+
+impl GrainZone {
+    fn head(&self) -> [f64; HEAD] {
+        let own = self.own.numbers();
+        std::array::from_fn(|k| match k.checked_sub(2) {
+            None => [self.edges.len() as f64, self.grain_steps][k],
+            Some(k) => own[k],
+        })
+    }
+
+    /// Appends all there is; to be called after every exchange.
+    pub fn write(&self, memory: &mut Vec<f64>) {
+        memory.extend(self.head());
+        for continuum in &self.continua {
+            for k in continuum.edges.clone() {
+                let length = memory.len();
+                memory.push(0.0);
+                let keeps = k == continuum.edges.start + continuum.keeper;
+                self.edges[k].write(continuum, keeps, memory);
+                memory[length] = (memory.len() - length - 1) as f64;
+            }
+        }
+    }
+
+    /// Writes what has changed since an exchange over what [`write`](Self::write) wrote after it.
+    pub fn write_over(&self, memory: &mut [f64]) {
+        memory[..HEAD].copy_from_slice(&self.head());
+        let mut from = HEAD;
+        for edge in &self.edges {
+            edge.write_over(&mut memory[from + 1..]);
+            from += 1 + memory[from] as usize;
+        }
+    }
+
+    /// Goes on from what was written of a zone with the same specification; the simulation is the one that was
+    /// joined, resumed itself.
+    ///
+    /// # Errors
+    /// If the numbers do not belong to this specification.
+    pub fn read(
+        specs: &[MaterialEdgeSpec],
+        memory: &[f64],
+        simulation: &Simulation,
+    ) -> Result<Self, OverlapError> {
+        let damaged = || OverlapError::Record("the joined column's memory misses a part".into());
+        let (head, mut rest) = memory.split_first_chunk::<HEAD>().ok_or_else(damaged)?;
+        if head[0] != specs.len() as f64 {
+            return Err(damaged());
+        }
+        let mut memories = Vec::with_capacity(specs.len());
+        for _ in specs {
+            let (length, after) = rest.split_first().ok_or_else(damaged)?;
+            let (own, after) = after
+                .split_at_checked(*length as usize)
+                .ok_or_else(damaged)?;
+            memories.push(own);
+            rest = after;
+        }
+        let ours = layout::grains(specs);
+        let mut zone = Self::of(Vec::new(), Vec::new());
+        for own in layout::continua(specs) {
+            let mut continuum = None;
+            let keeper = layout::keeper(specs, &own);
+            let mut order: Vec<usize> = own.clone().collect();
+            order.sort_by_key(|k| *k != keeper);
+            let mut edges = Vec::new();
+            for k in order {
+                let known = (own.clone(), &mut continuum);
+                let memory = memories[k];
+                let edge = MaterialEdge::read_back((specs, k), ours[k], memory, known, simulation)?;
+                edges.push((k, edge.ok_or_else(damaged)?));
+            }
+            edges.sort_by_key(|(k, _)| *k);
+            zone.edges.extend(edges.into_iter().map(|(_, edge)| edge));
+            zone.continua.extend(continuum);
+        }
+        zone.grain_steps = head[1];
+        zone.own = Account::of(&std::array::from_fn(|k| head[2 + k]));
+        zone.weigh(simulation);
+        Ok(zone)
     }
 }

@@ -30,6 +30,7 @@ mod copy;
 mod embedded;
 mod exchange;
 mod labels;
+mod layout;
 mod memory;
 #[cfg(test)]
 mod rotation;
@@ -38,12 +39,14 @@ mod side;
 mod start;
 mod totals;
 mod travel;
+mod view;
 mod watch;
 mod witness;
 mod zone;
 
 pub use account::{Account, Monitors};
 pub use cells::Cells;
+pub use continuum::Continuum;
 pub use side::Side;
 pub use travel::{Move, Travel};
 pub use witness::{Through, Witness};
@@ -54,13 +57,13 @@ use super::rest_stress::RestStress;
 use super::settings::Resolved;
 use super::sighting::{Sighting, free_grains};
 use cells::Sums;
-use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
+use colluvium_continuum::column_collapse::CollapseCase;
 use colluvium_continuum::free_surface::{Outside, SurfaceOptions};
 use colluvium_dem::{GrainSample, Simulation};
-use continuum::View;
 use labels::{Labels, NO_LABEL};
 use rows::Row;
 use travel::Journey;
+use view::View;
 
 /// Exchanges longer by no more than this factor than the continuum's largest step are one step, not two halves.
 const NEARLY: f64 = 1.1;
@@ -171,11 +174,10 @@ impl Given {
 /// said otherwise. The grains are the caller's: every call needs the same simulation.
 pub struct MaterialEdge {
     spec: MaterialEdgeSpec,
+    /// The continuum's grid.
     cells: Cells,
-    collapse: Collapse,
-    /// Mass of the continuum, copy included, and of what rests behind it (kg).
-    continuum_mass: f64,
-    rest_mass: f64,
+    /// Between which places its grains lie at the start (m).
+    ours: [f64; 2],
     labels: Labels,
     journey: Journey,
     sums: Sums,
@@ -206,30 +208,33 @@ impl MaterialEdge {
         (settings.load_time / timestep).round().max(1.0) as u64
     }
 
-    /// Gives all grains their labels and makes the continuum of those behind the edge, which are still there.
-    fn mark(spec: MaterialEdgeSpec, simulation: &mut Simulation) -> Result<Self, OverlapError> {
-        let mut sighting = Sighting::default();
-        sighting.look_along(spec.side, simulation);
-        let [_, inner] = spec.zones();
+    /// Loads until an exchange, for a time step (s).
+    fn loads_of_exchange(settings: &Resolved, timestep: f64) -> u64 {
+        let load_time = Self::steps_of_loads(settings, timestep) as f64 * timestep;
+        (settings.exchange_time / load_time).round().max(1.0) as u64
+    }
+
+    /// Gives its grains their labels, those too that become its continuum and are still there.
+    fn mark(
+        spec: MaterialEdgeSpec,
+        ours: [f64; 2],
+        continuum: &Continuum,
+        sighting: Sighting,
+        simulation: &Simulation,
+    ) -> Self {
         let free = || sighting.snapshot.grains.iter().filter(|g| !g.fixed);
         let last = free().map(|g| g.id).max().unwrap_or(0) as usize;
         let mut labels = vec![NO_LABEL; last + 1];
-        let (mut behind, mut before) = (0.0, 0.0);
-        for grain in free() {
-            let label = grain.position.x - spec.place;
-            if grain.position.x < spec.wall {
-                behind += grain.mass;
-            } else if label < inner {
-                before += grain.mass;
-            }
-            labels[grain.id as usize] = label;
+        let [from, to] = ours;
+        for grain in free().filter(|g| (from..=to).contains(&g.position.x)) {
+            labels[grain.id as usize] = grain.position.x - spec.place;
         }
-        let mut edge = Self::around(spec, [before, behind], labels, simulation)?;
+        let mut edge = Self::around(spec, ours, continuum, labels, simulation);
         edge.sighting = sighting;
         // Stresses as they are while all grains are still there.
         edge.sum_up(1.0);
         edge.remember_rest();
-        Ok(edge)
+        edge
     }
 
     /// Takes the grains behind the edge away.
@@ -239,18 +244,11 @@ impl MaterialEdge {
         }
         let (side, place) = (self.spec.side, self.spec.place);
         let floor = place - self.spec.settings.inner;
-        simulation.remove(|g| side.along(g.position.x) < if g.fixed { floor } else { place });
-    }
-
-    /// Meets the grains that are left.
-    fn meet(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
-        self.look(simulation);
-        self.account.continuum_before = self.continuum_momentum();
-        self.prime()?;
-        self.agree();
-        // What it was primed with is not its state.
-        self.view.look(&self.collapse, &self.cells);
-        Ok(())
+        let begins = self.ours[0];
+        simulation.remove(|g| {
+            let at = side.along(g.position.x);
+            at >= begins && at < if g.fixed { floor } else { place }
+        });
     }
 
     /// Looks at the grains as they are now, along its own axis.
@@ -260,33 +258,16 @@ impl MaterialEdge {
 
     fn around(
         spec: MaterialEdgeSpec,
-        [mass, rest_mass]: [f64; 2],
+        ours: [f64; 2],
+        continuum: &Continuum,
         labels: Vec<f64>,
         simulation: &Simulation,
-    ) -> Result<Self, OverlapError> {
-        let steps_of_loads = Self::steps_of_loads(&spec.settings, simulation.timestep());
-        let load_time = steps_of_loads as f64 * simulation.timestep();
-        let loads = (spec.settings.exchange_time / load_time).round().max(1.0);
-        let column = spec.column(mass);
-        let exchange = loads * load_time / (column.height / column.gravity).sqrt();
-        // The copy is made anew at every exchange.
-        let mut options = spec.options.of_first_order();
-        if exchange < NEARLY * options.largest_step {
-            options.largest_step = options.largest_step.max(copy::ROUNDED * exchange);
-        }
-        let collapse = start::column(&spec, &column, &options)?;
-        let axes = collapse.flow().grid().axes();
-        let cells = Cells {
-            counts: [axes[0].cells(), axes[1].cells()],
-            low: spec.wall,
-            spacing: spec.spacing(),
-            slab: spec.slab,
-        };
-        Ok(Self {
+    ) -> Self {
+        let cells = continuum.cells_along(spec.side);
+        let timestep = simulation.timestep();
+        Self {
             cells,
-            collapse,
-            continuum_mass: mass,
-            rest_mass,
+            ours,
             labels: Labels {
                 given: labels,
                 base: vec![spec.place; cells.counts[1]],
@@ -315,16 +296,16 @@ impl MaterialEdge {
             owed: vec![[0.0; 2]; cells.count()],
             account: Account::default(),
             monitors: Monitors::default(),
-            steps_of_loads,
-            loads_of_exchange: loads as u64,
+            steps_of_loads: Self::steps_of_loads(&spec.settings, timestep),
+            loads_of_exchange: Self::loads_of_exchange(&spec.settings, timestep),
             made: 0,
             exchanges: 0,
-            timestep: simulation.timestep(),
+            timestep,
             sighting: Sighting::default(),
             scratch: exchange::Scratch::default(),
             outside: Outside::nothing(cells.count()),
             spec,
-        })
+        }
     }
 
     /// Takes K_0 from the stresses of the grains that become continuum or overlap.
@@ -332,7 +313,10 @@ impl MaterialEdge {
         let end = self.spec.place + self.spec.zones()[1];
         let columns = self.cells.counts[0];
         let cells = self.sums.stress.iter().enumerate();
-        let behind = cells.filter(|(cell, _)| self.cells.centre(cell % columns) < end);
+        let behind = cells.filter(|(cell, _)| {
+            let centre = self.cells.centre(cell % columns);
+            centre > self.spec.back && centre < end
+        });
         let [across, down] = behind.fold([0.0; 2], |sum, (_, s)| [sum[0] + s[0], sum[1] + s[1]]);
         self.view.rest.measure(across, down);
     }
@@ -350,22 +334,11 @@ impl MaterialEdge {
         self.labels.of(grain)
     }
 
-    /// Whether totals count a grain (along x): it lies in front of the handshake surface, whose other side they count as
-    /// continuum. By its label it would be counted where the continuum is too, once labels have mixed.
-    pub fn counts(&self, grain: &GrainSample) -> bool {
+    /// Whether a grain (along x) lies in front of the handshake surface; none of one that is not its own.
+    fn is_in_front(&self, grain: &GrainSample) -> Option<bool> {
         let grain = self.spec.side.grain(*grain);
-        self.label(&grain).is_some()
-            && witness::is_before(&grain, &self.cells, &self.held.handshake)
-    }
-
-    /// The continuum.
-    pub fn collapse(&self) -> &Collapse {
-        &self.collapse
-    }
-
-    /// The grid of the continuum.
-    pub fn cells(&self) -> &Cells {
-        &self.cells
+        self.label(&grain)
+            .map(|_| witness::is_before(&grain, &self.cells, &self.held.handshake))
     }
 
     /// What it was made from.
@@ -430,49 +403,6 @@ impl MaterialEdge {
         let momenta = grains.iter().map(|g| g.mass * g.velocity);
         let sum = momenta.fold(nalgebra::Vector3::zeros(), |sum, p| sum + p);
         self.spec.side.in_plane([sum.x, sum.z])
-    }
-
-    /// Momentum of the continuum, copy included (N s).
-    pub fn continuum_momentum(&self) -> [f64; 2] {
-        let unit = self.impulse_unit();
-        self.collapse.flow().momentum().map(|p| p * unit)
-    }
-
-    /// Kinetic energy of the continuum behind the handshake surface, of the mean velocities of its cells (J).
-    pub fn continuum_kinetic(&self) -> f64 {
-        let columns = self.cells.counts[0];
-        let cells = self.view.velocity.iter().zip(&self.view.fraction);
-        let counted = cells.enumerate().filter(|(cell, _)| {
-            let place = self.cells.centre(cell % columns);
-            place < self.held.handshake[cell / columns]
-        });
-        let twice: f64 = counted.map(|(_, ([u, w], f))| f * (u * u + w * w)).sum();
-        0.5 * self.spec.density() * self.cells.volume() * twice
-    }
-
-    /// Mass of the continuum, copy included (kg).
-    pub fn continuum_mass(&self) -> f64 {
-        self.continuum_mass
-    }
-
-    /// Mass of what rests behind the continuum (kg).
-    pub fn rest_mass(&self) -> f64 {
-        self.rest_mass
-    }
-
-    /// Height of the continuum, copy included, over each column of cells (m).
-    pub fn continuum_heights(&self) -> (Vec<f64>, Vec<f64>) {
-        let (mut places, heights) = self.collapse.profile();
-        for place in &mut places {
-            *place += self.spec.wall;
-        }
-        (places, heights)
-    }
-
-    /// ρ U L² W (N s).
-    fn impulse_unit(&self) -> f64 {
-        let u = self.collapse.units();
-        u.density * u.velocity * u.length * u.length * self.spec.slab
     }
 
     /// Where the handshake surface is, row by row (m): where grains of nearby labels have moved to.

@@ -26,7 +26,7 @@ fn grains(spin: Vector3<f64>) -> Vec<Grain> {
     (0..count).map(ball).collect()
 }
 
-fn joined(rate: f64, drift: [f64; 2], ours: f64) -> (MaterialEdge, Simulation) {
+fn joined(rate: f64, drift: [f64; 2], ours: f64) -> (GrainZone, Simulation) {
     let law = ContactLaw::linear(
         Hooke::matched(1e4, 0.5),
         TangentialSpring::matched(2.0 / 7.0, 0.5, 0.5),
@@ -73,9 +73,8 @@ fn joined(rate: f64, drift: [f64; 2], ours: f64) -> (MaterialEdge, Simulation) {
         settings: settings.resolve(&scales, false).unwrap(),
         travel: None,
     };
-    let mut edge = MaterialEdge::mark(spec, &mut simulation).unwrap();
-    edge.cut_off(&mut simulation);
-    edge.meet(&mut simulation).unwrap();
+    let mut zone = GrainZone::cut(&[spec], &mut simulation).unwrap();
+    let (edge, continuum) = (&mut zone.edges[0], &mut zone.continua[0]);
     let centre = [EDGE, 0.5 * HEIGHT];
     let turn = |rate: f64, x: f64, z: f64| {
         [
@@ -87,8 +86,8 @@ fn joined(rate: f64, drift: [f64; 2], ours: f64) -> (MaterialEdge, Simulation) {
         let [u, w] = turn(ours, g.position.x, g.position.z);
         Vector3::new(u, 0.0, w)
     });
-    let mut state = edge.collapse.flow().state().clone();
-    let (h, unit) = (edge.cells.spacing, edge.collapse.units().velocity);
+    let mut state = continuum.collapse.flow().state().clone();
+    let (h, unit) = (edge.cells.spacing, continuum.collapse.units().velocity);
     let [columns, rows] = edge.cells.counts;
     for k in 0..rows {
         for i in 0..=columns {
@@ -102,13 +101,13 @@ fn joined(rate: f64, drift: [f64; 2], ours: f64) -> (MaterialEdge, Simulation) {
             state.velocity[1][i + columns * k] = w / unit;
         }
     }
-    edge.collapse.set_state(state).unwrap();
+    continuum.collapse.set_state(state).unwrap();
     edge.look(&mut simulation);
     edge.see_grains();
-    edge.view.look(&edge.collapse, &edge.cells);
+    edge.look_at(continuum);
     edge.agree();
     edge.lay(&simulation, &mut Vec::new(), None);
-    (edge, simulation)
+    (zone, simulation)
 }
 
 /// Largest acceleration of the relaxation, angular acceleration of spins, and force of the impedance, of rows away from floor and surface, where velocities
@@ -145,8 +144,8 @@ fn what_moves_and_turns_as_one_exchanges_nothing() {
         (0.2, [0.0, 0.0]),
         (-0.3, [0.2, 0.1]),
     ] {
-        let (edge, _) = joined(rate, drift, rate);
-        let [acceleration, spin, force] = exchanged(&edge);
+        let (zone, _) = joined(rate, drift, rate);
+        let [acceleration, spin, force] = exchanged(&zone.edges[0]);
         println!("{rate} {drift:?}: {acceleration:.1e} {spin:.1e} {force:.1e}");
         assert!(acceleration < 1e-13 && spin < 1e-13 && force < 1e-10);
     }
@@ -155,8 +154,8 @@ fn what_moves_and_turns_as_one_exchanges_nothing() {
 /// The control: both turn, but not at the same rate.
 #[test]
 fn what_turns_at_another_rate_does() {
-    let (edge, _) = joined(0.2, [0.0; 2], 0.22);
-    let [acceleration, spin, force] = exchanged(&edge);
+    let (zone, _) = joined(0.2, [0.0; 2], 0.22);
+    let [acceleration, spin, force] = exchanged(&zone.edges[0]);
     assert!(
         acceleration > 1e-3 && spin > 1e-3 && force > 1.0,
         "{acceleration:e} {spin:e} {force:e}"
@@ -166,7 +165,8 @@ fn what_turns_at_another_rate_does() {
 /// The continuum takes a couple as forces that move nothing and turn as much the other way.
 #[test]
 fn a_couple_is_answered_by_forces_of_its_moment() {
-    let (mut edge, _) = joined(0.0, [0.0; 2], 0.0);
+    let (mut zone, _) = joined(0.0, [0.0; 2], 0.0);
+    let edge = &mut zone.edges[0];
     let columns = edge.cells.counts[0];
     edge.owed.fill([0.0; 2]);
     edge.given.spin.fill(0.0);

@@ -31,6 +31,20 @@ impl Side {
         [self.along(x), z]
     }
 
+    /// ((σ_xx − σ_zz)/2, σ_xz) on the edge's own axes; and back. A shear stress changes its sign in a mirror, a difference of normal
+    /// stresses does not.
+    pub(super) fn stress(self, [normal, shear]: [f64; 2]) -> [f64; 2] {
+        [normal, self.along(shear)]
+    }
+
+    /// How what has the axis of this side looks along that of another: as it is, or in a mirror.
+    pub(super) fn seen_along(self, other: Self) -> Self {
+        match self == other {
+            true => Self::Below,
+            false => Self::Above,
+        }
+    }
+
     /// A vector in space on the edge's own axes; and back.
     pub fn turned(self, v: Vector3<f64>) -> Vector3<f64> {
         Vector3::new(self.along(v.x), v.y, v.z)
@@ -61,6 +75,13 @@ impl Side {
             partner_torque: self.turned_about(contact.partner_torque),
             ..contact
         }
+    }
+}
+
+/// Turns the order of the numbers of each row of so many.
+pub(super) fn mirror_rows<T>(values: &mut [T], columns: usize) {
+    for row in values.chunks_mut(columns.max(1)) {
+        row.reverse();
     }
 }
 

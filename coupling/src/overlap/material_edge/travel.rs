@@ -16,7 +16,7 @@
 //! at the edge alone, by whole strips; momentum that goes with it is booked. Every move is kept with its reason
 //! ([`Move`]).
 
-use super::{MaterialEdge, OverlapError};
+use super::{Continuum, MaterialEdge, OverlapError};
 use colluvium_dem::{Grain, GrainSample, Patch, Simulation};
 use nalgebra::Vector3;
 
@@ -132,8 +132,14 @@ impl MaterialEdge {
 
     /// Puts by what lies behind the edge when it is cut, as strips, as far as the edge may ever come back.
     pub(super) fn put_by(&mut self, travel: &Travel, simulation: &mut Simulation) {
-        let least = super::LEAST_CELLS * self.cells.spacing;
-        let room = self.spec.place - self.spec.back - least;
+        let [behind, _] = self.ours;
+        // Of a continuum with an edge at each end, each may take its half.
+        let (end, part) = match behind > self.spec.back {
+            true => (behind, 0.5),
+            false => (self.spec.back, 1.0),
+        };
+        let least = part * super::LEAST_CELLS * self.cells.spacing;
+        let room = self.spec.place - end - least;
         let strips = (room / travel.width).max(0.0) as usize;
         for strip in (0..strips).rev() {
             let patch = simulation.take_out(|g| self.strip(g, travel.width) == Some(strip));
@@ -143,6 +149,9 @@ impl MaterialEdge {
 
     fn strip(&self, grain: &GrainSample, width: f64) -> Option<usize> {
         let grain = &self.spec.side.grain(*grain);
+        if grain.fixed && grain.position.x < self.ours[0] {
+            return None;
+        }
         let base = self.labels.base.iter().copied();
         let floor = base.fold(f64::INFINITY, f64::min) - self.spec.settings.inner;
         let fixed = grain.fixed;
@@ -162,6 +171,7 @@ impl MaterialEdge {
     pub(super) fn travel(
         &mut self,
         room: f64,
+        continuum: &mut Continuum,
         simulation: &mut Simulation,
     ) -> Result<bool, OverlapError> {
         let Some(travel) = self.spec.travel.filter(|_| !self.spec.settings.uncoupled) else {
@@ -188,7 +198,7 @@ impl MaterialEdge {
         let hold = travel.hold * 2.0_f64.powf(self.journey.returns);
         if self.journey.resting * self.exchange_time() > hold {
             self.journey.resting = 0.0;
-            self.go_out(&travel, speed, simulation)?;
+            self.go_out(&travel, speed, continuum, simulation)?;
             return Ok(true);
         }
         Ok(false)
@@ -254,8 +264,8 @@ impl MaterialEdge {
         }
     }
 
-    /// Looks at the grains after another edge has moved, and gives labels to those that came with it: they lie as far from this
-    /// edge as it is now.
+    /// Looks at the grains after another edge has moved, and gives labels to those of its own that came with it: they lie as far from
+    /// this edge as it is now.
     pub(super) fn see_newcomers(&mut self, known: &[u32], simulation: &mut Simulation) {
         self.look(simulation);
         for grain in self.sighting.snapshot.grains.iter().filter(|g| !g.fixed) {
@@ -264,7 +274,7 @@ impl MaterialEdge {
             }
             let rows = self.cells.rows(grain.position.z).into_iter();
             let edge: f64 = rows.map(|(row, hat)| hat * self.held.rows[row].place).sum();
-            if let Some(label) = self.labels.given.get_mut(grain.id as usize) {
+            if let Some(label) = self.labels.given_to(grain.id) {
                 *label = grain.position.x - edge;
             }
         }
@@ -276,12 +286,12 @@ impl MaterialEdge {
         free.map(|g| g.id).collect()
     }
 
-    /// Gives all grains labels anew, for an edge at these places row by row (m).
+    /// Gives its grains labels anew, for an edge at these places row by row (m).
     fn give_labels(&mut self, places: Vec<f64>) {
         self.labels.base = places;
         for grain in self.sighting.snapshot.grains.iter().filter(|g| !g.fixed) {
             let base = self.labels.base_at(&self.cells, grain.position.z);
-            if let Some(label) = self.labels.given.get_mut(grain.id as usize) {
+            if let Some(label) = self.labels.given_to(grain.id) {
                 *label = grain.position.x - base;
             }
         }
@@ -291,6 +301,7 @@ impl MaterialEdge {
         &mut self,
         travel: &Travel,
         speed: f64,
+        continuum: &mut Continuum,
         simulation: &mut Simulation,
     ) -> Result<(), OverlapError> {
         let places = self.surface_of(travel.width);
@@ -298,7 +309,7 @@ impl MaterialEdge {
         self.labels.edge += travel.width;
         // The copy of what changes hands says all that its grains say.
         self.see_grains();
-        self.copy_the_grains(f64::INFINITY)?;
+        self.copy_the_grains(continuum, f64::INFINITY)?;
         let before = self.held_momentum(simulation);
         let patch = simulation.take_out(|g| self.strip(g, travel.width).is_some());
         let mass = -patch.mass();

@@ -1,50 +1,60 @@
-//! Grains with continuum on one side of them or on both: the edges of one zone, which go in step.
+//! Grains and the continua that they are joined to: the edges of one zone, which go in step.
 //!
-//! An interval of grains has an edge at each end that is not a wall of the column, one or two. Each has a continuum of its own,
-//! which the others meet through the grains alone, and its own overlap, labels, strips and account. What concerns all
+//! Grains lie in intervals of x, each of which ends at an edge or at a wall of the column; between two of them, or beyond the last, lies a
+//! continuum ([`layout`]). Every edge has its own overlap, labels, strips and account; a continuum with grains on both sides of it has two
+//! ([`Continuum`]), and continua meet each other through grains alone. What concerns all
 //! grains at once is done here: they are cut off, weighed and loaded once, totals count them where they lie in front of the handshake
-//! surfaces of all edges, and of two edges that want to move the lower one goes first. A grain that two edges act on bears
+//! surfaces of all their edges, and of edges that want to move the lower one goes first. A grain that two edges act on bears
 //! the sum.
 
-use super::{Account, MaterialEdge, MaterialEdgeSpec, OverlapError, Side, account};
+use super::{Account, Continuum, MaterialEdge, MaterialEdgeSpec, OverlapError, Side, layout};
 use crate::overlap::angular::AngularBook;
-use crate::overlap::sighting::free_mass;
-use colluvium_dem::{GrainSample, Load, Simulation};
+use crate::overlap::sighting::{Sighting, free_mass};
+use colluvium_dem::{Load, Simulation};
 
 /// Diameters of grains between two overlaps that moves leave.
 const BETWEEN: f64 = 4.0;
-/// Numbers in front of those of the edges, with the lengths of which they end: how many there are, and steps of grains.
-const HEAD: usize = 2 + account::NUMBERS;
-
 /// Grains and what they are joined to. They are the caller's: every call needs the same simulation.
 pub struct GrainZone {
-    edges: Vec<MaterialEdge>,
+    pub(super) edges: Vec<MaterialEdge>,
+    pub(super) continua: Vec<Continuum>,
     /// Mass of the free grains (kg).
     grain_mass: f64,
     /// What no edge books by itself: masses at the start, the grains' momentum then, and their weight.
-    own: Account,
-    grain_steps: f64,
+    pub(super) own: Account,
+    pub(super) grain_steps: f64,
     angular: Option<AngularBook>,
     loads: Vec<Load>,
 }
 
 impl GrainZone {
-    /// Cuts a column of grains at its edges: what lies behind them becomes continuum.
+    /// Cuts a column of grains at its edges, along x: what lies behind them becomes continuum.
     ///
     /// # Errors
-    /// Settings out of range, edges that leave no grains between their overlaps or do not lie on both sides of them, no grains on a side,
+    /// Settings out of range, edges that leave no grains between their overlaps or no continuum between them, no grains on a side,
     /// or a continuum that cannot stand.
     pub fn cut(
         specs: &[MaterialEdgeSpec],
         simulation: &mut Simulation,
     ) -> Result<Self, OverlapError> {
-        check(specs)?;
+        layout::check(specs)?;
         let total = free_mass(simulation);
-        // Stresses as they are while all grains are still there.
-        let edges = specs
-            .iter()
-            .map(|spec| MaterialEdge::mark(*spec, simulation));
-        let mut zone = Self::of(edges.collect::<Result<_, _>>()?);
+        let mut zone = Self::of(Vec::new(), Vec::new());
+        let ours = layout::grains(specs);
+        for own in layout::continua(specs) {
+            let keeper = layout::keeper(specs, &own);
+            let mut seen = Sighting::default();
+            seen.look_along(specs[keeper].side, simulation);
+            let free = seen.snapshot.grains.iter().filter(|g| !g.fixed);
+            let continuum = Continuum::of_grains(specs, own.clone(), free, simulation.timestep())?;
+            for k in own {
+                let mut seen = Sighting::default();
+                seen.look_along(specs[k].side, simulation);
+                let edge = MaterialEdge::mark(specs[k], ours[k], &continuum, seen, simulation);
+                zone.edges.push(edge);
+            }
+            zone.continua.push(continuum);
+        }
         zone.own.mass = total;
         for edge in &mut zone.edges {
             edge.cut_off(simulation);
@@ -52,15 +62,28 @@ impl GrainZone {
         zone.weigh(simulation);
         zone.own.grains_before = zone.grain_momentum(simulation);
         for edge in &mut zone.edges {
-            edge.meet(simulation)?;
+            edge.look(simulation);
+        }
+        for continuum in &mut zone.continua {
+            let edges = &mut zone.edges[continuum.edges.clone()];
+            if let Some(keeper) = edges.get_mut(continuum.keeper) {
+                keeper.account.continuum_before = keeper.spec.side.in_plane(continuum.momentum());
+            }
+            continuum.prime(edges)?;
+            for edge in edges {
+                edge.agree();
+                // What it was primed with is not its state.
+                edge.look_at(continuum);
+            }
         }
         zone.lay(simulation)?;
         Ok(zone)
     }
 
-    fn of(edges: Vec<MaterialEdge>) -> Self {
+    pub(super) fn of(edges: Vec<MaterialEdge>, continua: Vec<Continuum>) -> Self {
         Self {
             edges,
+            continua,
             grain_mass: 0.0,
             own: Account::default(),
             grain_steps: 0.0,
@@ -73,12 +96,13 @@ impl GrainZone {
     /// time to, and lays the next loads.
     ///
     /// # Errors
-    /// If the continuum's step fails or the grains refuse a load.
+    /// If a continuum's step fails or the grains refuse a load.
     pub fn go_on(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
         self.book_grains(simulation);
         let mut exchanged = false;
-        for edge in &mut self.edges {
-            exchanged = edge.go_on(simulation)?;
+        for continuum in &mut self.continua {
+            let own = continuum.edges.clone();
+            exchanged = continuum.go_on(&mut self.edges[own], simulation)?;
         }
         if exchanged {
             self.travel(simulation)?;
@@ -103,7 +127,7 @@ impl GrainZone {
         [gravity.x, gravity.z].map(|g| self.grain_mass * g * time)
     }
 
-    fn weigh(&mut self, simulation: &Simulation) {
+    pub(super) fn weigh(&mut self, simulation: &Simulation) {
         self.grain_mass = free_mass(simulation);
     }
 
@@ -111,15 +135,22 @@ impl GrainZone {
     fn travel(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
         let angular = self.angular.is_some();
         let before = angular.then(|| simulation.leapfrog_angular_momentum());
-        for k in 0..self.edges.len() {
-            let room = self.room();
-            if !self.edges[k].travel(room, simulation)? {
-                continue;
-            }
-            self.weigh(simulation);
-            for other in (0..self.edges.len()).filter(|other| *other != k) {
-                let known = self.edges[other].seen();
-                self.edges[other].see_newcomers(&known, simulation);
+        for n in 0..self.continua.len() {
+            for k in self.continua[n].edges.clone() {
+                let room = self.room(k);
+                let continuum = &mut self.continua[n];
+                if !self.edges[k].travel(room, continuum, simulation)? {
+                    continue;
+                }
+                self.weigh(simulation);
+                for other in (0..self.edges.len()).filter(|other| *other != k) {
+                    let edge = &mut self.edges[other];
+                    let known = edge.seen();
+                    edge.see_newcomers(&known, simulation);
+                    if self.continua[n].edges.contains(&other) {
+                        edge.look_at(&self.continua[n]);
+                    }
+                }
             }
         }
         if let Some((book, before)) = self.angular.as_mut().zip(before) {
@@ -128,9 +159,14 @@ impl GrainZone {
         Ok(())
     }
 
-    /// How much of the grains that belong to no overlap may become continuum (m).
-    fn room(&self) -> f64 {
-        let [below, above] = &self.edges[..] else {
+    /// How much of the grains that belong to no overlap may become continuum at an edge (m).
+    fn room(&self, edge: usize) -> f64 {
+        let (below, above) = match self.edges[edge].spec.side {
+            Side::Below => (Some(edge), Some(edge + 1)),
+            Side::Above => (edge.checked_sub(1), Some(edge)),
+        };
+        let pair = [below, above].map(|k| k.and_then(|k| self.edges.get(k)));
+        let [Some(below), Some(above)] = pair else {
             return f64::INFINITY;
         };
         let taken = |edge: &MaterialEdge| edge.spec.zones()[1];
@@ -171,9 +207,9 @@ impl GrainZone {
         &self.edges
     }
 
-    /// Whether totals count a grain: it lies in front of all handshake surfaces.
-    pub fn counts(&self, grain: &GrainSample) -> bool {
-        self.edges.iter().all(|edge| edge.counts(grain))
+    /// Its continua, along x.
+    pub fn continua(&self) -> &[Continuum] {
+        &self.continua
     }
 
     /// Accounts since the start along x and z, with what the grains have been given since the last exchange.
@@ -193,7 +229,8 @@ impl GrainZone {
 
     /// Momentum that the continua have still to take from the relaxation, along x and z (N s).
     pub fn owed(&self, simulation: &Simulation) -> [f64; 2] {
-        self.sum(|edge| edge.spec.side.in_plane(edge.owed(simulation)))
+        let edges = self.edges.iter();
+        sum(edges.map(|edge| edge.spec.side.in_plane(edge.owed(simulation))))
     }
 
     /// Momentum of the grains along x and z, with what walls have taken (N s).
@@ -204,77 +241,12 @@ impl GrainZone {
 
     /// Momentum of the continua along x and z, copies included (N s).
     pub fn continuum_momentum(&self) -> [f64; 2] {
-        self.sum(|edge| edge.spec.side.in_plane(edge.continuum_momentum()))
-    }
-
-    fn sum(&self, of: impl Fn(&MaterialEdge) -> [f64; 2]) -> [f64; 2] {
-        let all = self.edges.iter().map(of);
-        all.fold([0.0; 2], |sum, own| [sum[0] + own[0], sum[1] + own[1]])
-    }
-
-    /// Kinetic energy of the continua behind the handshake surfaces (J).
-    pub fn continuum_kinetic(&self) -> f64 {
-        self.edges.iter().map(MaterialEdge::continuum_kinetic).sum()
-    }
-
-    /// Mass of the continua, copies included (kg).
-    pub fn continuum_mass(&self) -> f64 {
-        self.edges.iter().map(MaterialEdge::continuum_mass).sum()
+        sum(self.continua.iter().map(Continuum::momentum))
     }
 
     /// Mass of grains and continua at the start, each counted on its side, and of what rests behind (kg).
     pub fn whole_mass(&self) -> f64 {
         self.own.mass
-    }
-
-    /// Largest error of a continuum's volume, relative.
-    pub fn volume_error(&self) -> f64 {
-        let errors = self.edges.iter().map(MaterialEdge::volume_error);
-        errors.fold(0.0, |most: f64, error| match error.abs() > most.abs() {
-            true => error,
-            false => most,
-        })
-    }
-
-    /// Mass of grains and of continua that totals count, over that of all grains at the start, less 1: what the
-    /// handshake surfaces gained or lost by differences of both sides' motion.
-    pub fn mass_error(&self, simulation: &Simulation) -> f64 {
-        let mut masses: Vec<(u32, f64)> = simulation
-            .held(|_| true)
-            .filter(|g| self.counts(g))
-            .map(|g| (g.id, g.mass))
-            .collect();
-        masses.sort_unstable_by_key(|m| m.0);
-        let grains: f64 = masses.iter().map(|m| m.1).sum();
-        let continuum = self.edges.iter().map(|edge| {
-            let solid: f64 = edge.parcels().iter().map(|[_, volume]| volume).sum();
-            solid * edge.spec.case.rheology.grain_density
-        });
-        (grains + continuum.sum::<f64>()) / self.own.mass - 1.0
-    }
-
-    /// The continua behind the handshake surfaces, and what rests behind them, as parcels: places along x (m) and volumes of
-    /// grains in them (m³).
-    pub fn parcels(&self) -> Vec<[f64; 2]> {
-        let of = |edge: &MaterialEdge| {
-            let side = edge.spec.side;
-            let parcels = edge.parcels().into_iter();
-            parcels.map(move |[x, volume]| [side.along(x), volume])
-        };
-        self.edges.iter().flat_map(of).collect()
-    }
-
-    /// Height of a continuum, copy included, at a place along x (m); beyond the ends of its grid that at its ends.
-    pub fn continuum_height(&self, x: f64) -> f64 {
-        let of = |edge: &MaterialEdge| {
-            let cell = (edge.spec.side.along(x) - edge.cells.low) / edge.cells.spacing;
-            let (_, heights) = edge.collapse.profile();
-            match cell >= 0.0 {
-                true => heights.get(cell as usize).copied().unwrap_or(0.0),
-                false => heights.first().copied().unwrap_or(0.0),
-            }
-        };
-        self.edges.iter().map(of).fold(0.0, f64::max)
     }
 
     /// Grains times their steps.
@@ -324,101 +296,9 @@ impl GrainZone {
     pub fn angular_book(&self) -> Option<&AngularBook> {
         self.angular.as_ref()
     }
-
-    fn head(&self) -> [f64; HEAD] {
-        let own = self.own.numbers();
-        std::array::from_fn(|k| match k.checked_sub(2) {
-            None => [self.edges.len() as f64, self.grain_steps][k],
-            Some(k) => own[k],
-        })
-    }
-
-    /// Appends all there is; to be called after every exchange.
-    pub fn write(&self, memory: &mut Vec<f64>) {
-        memory.extend(self.head());
-        for edge in &self.edges {
-            let length = memory.len();
-            memory.push(0.0);
-            edge.write(memory);
-            memory[length] = (memory.len() - length - 1) as f64;
-        }
-    }
-
-    /// Writes what has changed since an exchange over what [`write`](Self::write) wrote after it.
-    pub fn write_over(&self, memory: &mut [f64]) {
-        memory[..HEAD].copy_from_slice(&self.head());
-        let mut from = HEAD;
-        for edge in &self.edges {
-            edge.write_over(&mut memory[from + 1..]);
-            from += 1 + memory[from] as usize;
-        }
-    }
-
-    /// Goes on from what was written of a zone with the same specification; the simulation is the one that was
-    /// joined, resumed itself.
-    ///
-    /// # Errors
-    /// If the numbers do not belong to this specification.
-    pub fn read(
-        specs: &[MaterialEdgeSpec],
-        memory: &[f64],
-        simulation: &Simulation,
-    ) -> Result<Self, OverlapError> {
-        let damaged = || OverlapError::Record("the joined column's memory misses a part".into());
-        let (head, mut rest) = memory.split_first_chunk::<HEAD>().ok_or_else(damaged)?;
-        if head[0] != specs.len() as f64 {
-            return Err(damaged());
-        }
-        let mut edges = Vec::with_capacity(specs.len());
-        for spec in specs {
-            let (length, after) = rest.split_first().ok_or_else(damaged)?;
-            let (own, after) = after
-                .split_at_checked(*length as usize)
-                .ok_or_else(damaged)?;
-            edges.push(MaterialEdge::read(*spec, own, simulation)?);
-            rest = after;
-        }
-        let mut zone = Self::of(edges);
-        zone.grain_steps = head[1];
-        zone.own = Account::of(&std::array::from_fn(|k| head[2 + k]));
-        zone.weigh(simulation);
-        Ok(zone)
-    }
 }
 
-/// Whether edges can be those of one zone.
-fn check(specs: &[MaterialEdgeSpec]) -> Result<(), OverlapError> {
-    let refuse = |key, value, allowed| {
-        Err(OverlapError::OutOfRange {
-            key,
-            value,
-            allowed,
-        })
-    };
-    match specs {
-        [_] => Ok(()),
-        [below, above] if below.side == Side::Below && above.side == Side::Above => {
-            let apart = above.side.along(above.place) - below.place;
-            if below.settings.exchange_time != above.settings.exchange_time
-                || below.settings.load_time != above.settings.load_time
-            {
-                let time = above.settings.exchange_time;
-                return refuse(
-                    "exchange_time",
-                    time,
-                    "that of the other edge, as load_time",
-                );
-            }
-            match apart > below.zones()[1] + above.zones()[1] {
-                true => Ok(()),
-                false => refuse("zone", apart, "more than the widths of both overlaps"),
-            }
-        }
-        [_, _] => refuse(
-            "edges",
-            2.0,
-            "one below the grains and one above: continuum between grains is not joined",
-        ),
-        _ => refuse("edges", specs.len() as f64, "one or two"),
-    }
+/// Sum of vectors in the plane.
+fn sum(all: impl Iterator<Item = [f64; 2]>) -> [f64; 2] {
+    all.fold([0.0; 2], |sum, own| [sum[0] + own[0], sum[1] + own[1]])
 }

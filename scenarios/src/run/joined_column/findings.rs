@@ -7,12 +7,12 @@ use crate::run::column_of_grains::{FLOOR, FRONT_SHARE, OF_SHARE, STILL_LOOKS};
 use crate::run::heap::{edge, place_of_share};
 use crate::run::land::Land;
 use crate::run::world::Ran;
-use crate::scene::{ColumnFloorKind, DENSE, overlap_words};
+use crate::scene::{ColumnFloorKind, DENSE, GrainIntervals, overlap_words};
 use crate::state_hash;
 use crate::summary::{Figure, Quantity, Summary};
 use crate::table::Table;
 use colluvium_coupling::overlap::bowl::Reason;
-use colluvium_coupling::overlap::material_edge::{GrainZone, MaterialEdge, Move, Side};
+use colluvium_coupling::overlap::material_edge::{GrainZone, MaterialEdge, Move};
 
 /// Limits of the monitors: slip over √(g H), ratio of forces less 1, share of the relaxation.
 const MOST_SLIP: f64 = 0.01;
@@ -30,11 +30,9 @@ impl JoinedColumn<'_> {
         };
         let per_area = DENSE * scene.slab() / scene.grain_volume();
         let all = per_area * scene.section(scene.height) + floor * scene.length();
-        let left_out = scene.edges().into_iter().map(|(side, place)| {
-            let [column, ground] = match side {
-                Side::Below => [place; 2],
-                Side::Above => [scene.width() - place, scene.length() - place],
-            };
+        let left_out = scene.continua().into_iter().map(|[low, high]| {
+            let ends = [scene.width(), scene.length()];
+            let [column, ground] = ends.map(|end| high.unwrap_or(end) - low.unwrap_or(0.0));
             per_area * scene.height * column + floor * ground
         });
         (all - left_out.sum::<f64>()) / all
@@ -55,8 +53,8 @@ impl JoinedColumn<'_> {
             "{:.0} % of the grain-steps of a column of grains",
             100.0 * self.expected_share()
         );
-        let zones = match scene.zones.x {
-            Some(_) => self.interval_in_words(&steps),
+        let zones = match &scene.zones.x {
+            Some(intervals) => self.intervals_in_words(intervals, &steps),
             None => format!(
                 "continuum from x = {:.4} m (zones.rest_scaled = {:.4}; what lies behind rests) to x = {:.4} m ({:.1} d; zones.edge_scaled = \
                  {:.4}: {why}), grains beyond; {steps}",
@@ -98,28 +96,34 @@ impl JoinedColumn<'_> {
         lines
     }
 
-    /// Where grains lie between continua.
-    fn interval_in_words(&self, steps: &str) -> String {
+    /// Where grains lie beside continua.
+    fn intervals_in_words(&self, intervals: &GrainIntervals, steps: &str) -> String {
         let scene = self.scene;
         let d = scene.grains.diameter;
-        let of = |(side, place): (Side, f64)| match side {
-            Side::Below => format!(
-                "continuum from x = {:.4} m (zones.rest_scaled = {:.4}; what lies behind rests) to the low edge at {place:.4} m ({:.1} d)",
-                scene.rest(),
-                scene.rest() / scene.height,
-                place / d
-            ),
-            Side::Above => format!(
-                "continuum from the high edge at {place:.4} m ({:.1} d) on, with the column's front",
-                place / d
-            ),
+        let mut names = self.names().into_iter();
+        let mut named = |place: f64| {
+            let name = names.next().unwrap_or_default().replace('_', " ");
+            format!("the {name} at {place:.4} m ({:.1} d)", place / d)
         };
-        let edges: Vec<String> = scene.edges().into_iter().map(of).collect();
-        let range = match scene.zones.x {
-            Some([from, to]) => format!("zones.x = [{from}, {to}]"),
-            None => String::new(),
+        let of = |ends: [Option<f64>; 2]| {
+            let from = match ends[0] {
+                Some(low) => named(low),
+                None => format!(
+                    "x = {:.4} m (zones.rest_scaled = {:.4}; what lies behind rests)",
+                    scene.rest(),
+                    scene.rest() / scene.height
+                ),
+            };
+            match ends[1] {
+                Some(high) => format!("continuum from {from} to {}", named(high)),
+                None => format!("continuum from {from} on, with the column's front"),
+            }
         };
-        format!("{}, grains between ({range}); {steps}", edges.join(", "))
+        let continua: Vec<String> = scene.continua().into_iter().map(of).collect();
+        format!(
+            "{}, grains elsewhere (zones.x = {intervals}); {steps}",
+            continua.join(", ")
+        )
     }
 
     /// Results of the run for the summary, and tables.
@@ -261,7 +265,7 @@ impl JoinedColumn<'_> {
             summary.cost.cell_steps_per_s = cell_steps / summary.cost.wall_s;
         }
         summary.model.grains = now as u64;
-        let cells: usize = zone.edges().iter().map(|e| e.cells().count()).sum();
+        let cells: usize = zone.continua().iter().map(|c| c.cells().count()).sum();
         summary.model.cells = cells as u64;
         summary.put(
             "grain_steps_share",
@@ -488,18 +492,10 @@ fn sides(
         .heap_axis()
         .heights(free.map(|g| [g.position.x, volume(g.radius)]), base);
     let continuum = places.iter().map(|x| zone.continuum_height(*x)).collect();
-    // Height to which the material lies behind a handshake surface over each place.
-    let behind = |edge: &MaterialEdge, x: f64| {
-        let at = edge.spec().side.along(x);
-        let rows = edge.handshake().iter().filter(|place| **place < at).count();
-        rows as f64 * edge.cells().spacing
-    };
-    let handshake = places.iter().zip(&deposit).map(|(x, h)| {
-        let heights = zone.edges().iter().map(|edge| behind(edge, *x));
-        heights.fold(f64::INFINITY, f64::min).min(*h)
-    });
+    let handshake = places.iter().zip(&deposit);
+    let handshake = handshake.map(|(x, h)| zone.grains_height(*x).min(*h));
     let handshake = handshake.collect();
-    let cells = zone.edges().iter().flat_map(MaterialEdge::fields);
+    let cells = zone.fields().into_iter().flatten();
     let fields: Vec<_> = cells.map(|(cell, _)| cell).collect();
     let middle = |c: &colluvium_continuum::free_surface::CellFields, axis: usize| {
         0.5 * (c.lower[axis] + c.upper[axis])
@@ -526,15 +522,14 @@ fn sides(
 /// Moves of the edge with their reasons, in a table and in words.
 fn moves(zone: &GrainZone, summary: &mut Summary) -> Option<Table> {
     let edges = zone.edges();
-    let of_edge = |edge: &'_ MaterialEdge| -> Vec<(usize, f64, Move)> {
+    let of_edge = |(number, edge): (usize, &'_ MaterialEdge)| -> Vec<(usize, f64, Move)> {
         let spec = edge.spec();
-        let number = usize::from(spec.side == Side::Above);
         let moves = edge.moves().iter();
         moves
             .map(|m| (number, spec.side.along(spec.place + m.edge), *m))
             .collect()
     };
-    let mut all: Vec<_> = edges.iter().flat_map(of_edge).collect();
+    let mut all: Vec<_> = edges.iter().enumerate().flat_map(of_edge).collect();
     // In one exchange the lower edge moves first.
     all.sort_by(|a, b| a.2.time.total_cmp(&b.2.time));
     let inwards = all.iter().filter(|(.., m)| m.mass > 0.0).count();

@@ -5,18 +5,18 @@ use crate::vtkhdf::{Cells, Frame, Values};
 use colluvium_coupling::overlap::material_edge::GrainZone;
 
 /// Cells of the continuum as quadrilaterals in the plane y = 0, in the coordinates of its grains; `counted` is 1 where totals
-/// count it, behind the handshake surface, and 0 in its copy of the grains; `edge` is the number of the edge that it belongs to,
+/// count it, behind the handshake surface, and 0 in its copy of the grains; `edge` is the number of the continuum that it belongs to,
 /// along x from 0. It is what the last exchange left.
 pub(super) fn cells(zone: &GrainZone, time: f64) -> Frame {
     let (mut cells, mut counted, mut edges) = (Vec::new(), Vec::new(), Vec::new());
-    for (number, edge) in zone.edges().iter().enumerate() {
-        for (cell, is_counted) in edge.fields() {
+    for (number, continuum) in zone.fields().into_iter().enumerate() {
+        for (cell, is_counted) in continuum {
             cells.push(cell);
             counted.push(i64::from(is_counted));
             edges.push(number as i64);
         }
     }
-    // Both continua are of one material.
+    // All continua are of one material.
     let law = zone.edges().first().map(|edge| edge.spec().case.rheology);
     let inertia = law.map_or(0.0, |law| law.diameter * law.grain_density.sqrt());
     let fields = SurfaceFields {
