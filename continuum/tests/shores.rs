@@ -1,0 +1,243 @@
+//! Ponds at rest over slopes that cut the cells: where the level surface meets the ground the pressure is ρ g times the depth.
+use colluvium_continuum::column_collapse::{Collapse, CollapseCase, CollapseGround};
+use colluvium_continuum::free_surface::{Contact, SpaceFlow, SurfaceFlow, SurfaceOptions, Terrain};
+use colluvium_continuum::grid::{Axis, Boundary, Grid};
+use colluvium_continuum::rheology::MuI;
+use colluvium_continuum::terrain::{GridLines, Profile, Surface};
+
+const ROUGH: Boundary = Boundary::NoSlip { velocity: 0.0 };
+const SMOOTH: Boundary = Boundary::FreeSlip;
+/// In cells, which are the unit of length here.
+const DIAMETER: f64 = 1.0 / 3.0;
+
+fn grains() -> MuI {
+    MuI::new(0.32, 0.60, 0.4, DIAMETER, 1.0, 1.0)
+}
+
+fn precise() -> SurfaceOptions {
+    let mut options = SurfaceOptions {
+        growth: 1e9,
+        ..SurfaceOptions::default()
+    };
+    options.solver.strain_rate_floor = 1e-7;
+    options.solver.momentum_tolerance = 1e-9;
+    options
+}
+
+fn cells_long(cells: usize, low: Boundary) -> Axis {
+    Axis::Bounded {
+        length: cells as f64,
+        cells,
+        low,
+        high: SMOOTH,
+    }
+}
+
+/// Largest |p − ρ g depth| over ρ g times a cell, and over the pressure itself, in cells whose centre lies deeper than a
+/// tenth of a cell, and the largest speed.
+fn misses(pressure: &[f64], row: usize, level: f64, speed: f64) -> [f64; 3] {
+    let mut worst = [0.0_f64, 0.0, speed];
+    for (cell, &p) in pressure.iter().enumerate() {
+        let exact = level - ((cell / row) as f64 + 0.5);
+        if p >= 0.0 {
+            worst[0] = worst[0].max((p - exact).abs());
+            if exact > 0.1 {
+                worst[1] = worst[1].max((p / exact - 1.0).abs());
+            }
+        }
+    }
+    worst
+}
+
+/// The same of a pond 24 cells long over z = 1.3 + slope (x − 12 − shift), whose surface ends where it meets the ground, or
+/// cell by cell with what stands out of the ground taken off, so that it is not level there.
+fn pond(slope: f64, level: f64, shift: f64, is_level: bool) -> [f64; 3] {
+    let [columns, rows] = [24, 12];
+    let height = |x: f64| 1.3 + slope * (x - 12.0 - shift);
+    let ends = [-30.0, 60.0];
+    let ground = Profile::new(ends.map(|x| [x, height(x)]).to_vec()).unwrap();
+    let shore = 12.0 + shift + (level - 1.3) / slope;
+    let surface = if is_level {
+        vec![[ends[0], level], [shore, level], [ends[1], height(ends[1])]]
+    } else {
+        ends.map(|x| [x, level]).to_vec()
+    };
+    let surface = Profile::new(surface).unwrap();
+    let fractions = (0..columns * rows).map(|cell| {
+        let low = [cell % columns, cell / columns].map(|i| i as f64);
+        let high = low.map(|x| x + 1.0);
+        (surface.area_in(low, high) - ground.area_in(low, high)).max(0.0)
+    });
+    let axes = [cells_long(columns, SMOOTH), cells_long(rows, ROUGH)];
+    let terrain = Terrain {
+        shape: ground.clone(),
+        origin: [0.0; 2],
+        contact: Contact::NoSlip,
+        rise: [0; 2],
+    };
+    let mut flow: SurfaceFlow<MuI> = SurfaceFlow::over_ground(
+        Grid::with_moving_surface(axes).unwrap(),
+        &terrain,
+        fractions.collect(),
+        grains(),
+        [0.0, -1.0],
+        precise(),
+    )
+    .unwrap();
+    let before = flow.volume();
+    for _ in 0..5 {
+        flow.step(f64::INFINITY).unwrap();
+    }
+    assert!((flow.volume() / before - 1.0).abs() < 1e-13);
+    misses(&flow.state().pressure, columns, level, flow.max_speed())
+}
+
+/// Slopes of 0.2 to 1.7, the surface at four heights and two places in the cells: nothing moves, and the pressure is the
+/// exact one to 1e-9 of itself and of ρ g times a cell. Where what stands out of the ground is taken off the matter beside
+/// it the surface of the last cell is not level, and the pressure not that of one: negative control.
+#[test]
+fn pressure_at_shores_is_that_of_the_depth() {
+    let mut control = 0.0_f64;
+    let mut failures = Vec::new();
+    for slope in [0.2, 0.45, 0.8, 1.0, 1.7] {
+        for level in [4.05, 4.3, 4.55, 4.8] {
+            for shift in [0.0, 0.37] {
+                let [miss, relative, speed] = pond(slope, level, shift, true);
+                println!("{slope} {level} {shift}: {miss:.2e} {relative:.2e} {speed:.1e}");
+                if miss > 1e-9 || relative > 1e-9 || speed > 1e-6 * DIAMETER.sqrt() {
+                    failures.push((slope, level, shift, miss, relative, speed));
+                }
+                control = control.max(pond(slope, level, shift, false)[1]);
+            }
+        }
+    }
+    println!("not level: {control:e}");
+    assert!(failures.is_empty(), "{failures:?}");
+    assert!(control > 1e-3, "{control:e}");
+}
+
+/// The part of a convex polygon in the plane where a linear function is positive.
+fn clipped(polygon: &[[f64; 2]], function: impl Fn([f64; 2]) -> f64) -> Vec<[f64; 2]> {
+    let mut left = Vec::new();
+    for (n, &from) in polygon.iter().enumerate() {
+        let to = polygon[(n + 1) % polygon.len()];
+        let (a, b) = (function(from), function(to));
+        if a > 0.0 {
+            left.push(from);
+        }
+        if (a > 0.0) != (b > 0.0) {
+            left.push([0, 1].map(|k| from[k] + a / (a - b) * (to[k] - from[k])));
+        }
+    }
+    left
+}
+
+/// In space: a level surface over an incline oblique to the grid.
+#[test]
+fn pressure_at_shores_in_space() {
+    for (slope, level) in [([0.5, 0.3], 3.8), ([0.5, 0.3], 3.3), ([0.4, -0.9], 3.55)] {
+        let cells = [10, 8, 7];
+        let height = |[x, y]: [f64; 2]| 2.6 + slope[0] * (x - 5.0) + slope[1] * (y - 4.0);
+        let square = [[-2.0, -2.0], [12.0, -2.0], [12.0, 12.0], [-2.0, 12.0]];
+        // The higher one of level and ground.
+        let pieces = [
+            (clipped(&square, |at| level - height(at)), false),
+            (clipped(&square, |at| height(at) - level), true),
+        ];
+        let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+        for (piece, is_ground) in pieces {
+            let first = vertices.len();
+            vertices.extend(piece.iter().map(|&[x, y]| {
+                let z = if is_ground { height([x, y]) } else { level };
+                [x, y, z]
+            }));
+            triangles.extend((2..piece.len()).map(|n| [first, first + n - 1, first + n]));
+        }
+        let surface = Surface::new(vertices, triangles).unwrap();
+        let corners = square.map(|at| [at[0], at[1], height(at)]).to_vec();
+        let ground = Surface::new(corners, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
+        let lines = GridLines {
+            origin: [0.0; 3],
+            spacing: [1.0; 3],
+            cells,
+        };
+        let [under, below] = [&ground, &surface].map(|s| s.cut(&lines, false).unwrap());
+        let fractions = (0..cells.iter().product()).map(|n: usize| {
+            let index = [
+                n % cells[0],
+                n / cells[0] % cells[1],
+                n / (cells[0] * cells[1]),
+            ];
+            (under.volume_fraction(index) - below.volume_fraction(index)).max(0.0)
+        });
+        let [x, y, z] = cells;
+        let axes = [
+            cells_long(x, SMOOTH),
+            cells_long(y, SMOOTH),
+            cells_long(z, ROUGH),
+        ];
+        let terrain = Terrain {
+            shape: ground.clone(),
+            origin: [0.0; 3],
+            contact: Contact::NoSlip,
+            rise: [0; 3],
+        };
+        let mut flow: SpaceFlow<MuI> = SpaceFlow::over_ground(
+            Grid::with_moving_surface(axes).unwrap(),
+            &terrain,
+            fractions.collect(),
+            grains(),
+            [0.0, 0.0, -1.0],
+            precise(),
+        )
+        .unwrap();
+        for _ in 0..3 {
+            flow.step(f64::INFINITY).unwrap();
+        }
+        let found = misses(
+            &flow.state().pressure,
+            cells[0] * cells[1],
+            level,
+            flow.max_speed(),
+        );
+        println!("{slope:?} {level}: {found:?}");
+        let [miss, relative, speed] = found;
+        assert!(relative < 1e-9 && miss < 1e-9 && speed < 1e-6 * DIAMETER.sqrt());
+    }
+}
+
+/// A column that collapses over a step down, down a slope and up one: what the shore's plane does not fit is left alone, so steps
+/// are solved up to rest, and the fronts are those under planes of matter and ground together, to a hundredth.
+#[test]
+fn collapses_over_steps_and_slopes_come_to_rest() {
+    let case = CollapseCase {
+        overhang_degrees: 0.0,
+        aspect: 0.5,
+        height: 1.0,
+        gravity: 1.0,
+        rheology: MuI::new(0.32, 0.60, 0.4, 1.0 / 30.0, 1.0, 1.0),
+        cells: 64,
+        length_scaled: 5.0,
+    };
+    for (points, expected) in [
+        (vec![[0.0, 2.0], [3.1, 2.0], [3.1, 1.5], [6.0, 1.5]], 4.961),
+        (vec![[0.0, 0.0], [3.1, 0.0], [20.0, -3.0]], 4.325),
+        (vec![[0.0, 0.0], [3.1, 0.0], [20.0, 5.0]], 3.615),
+    ] {
+        let ground = CollapseGround {
+            profile: Profile::new(points).unwrap(),
+            contact: Contact::NoSlip,
+        };
+        let options = SurfaceOptions::default();
+        let mut collapse = Collapse::over_ground(&case, &options, &ground, None).unwrap();
+        while collapse.time() < 11.99 {
+            let step = collapse.step(12.0).unwrap();
+            if collapse.is_at_rest(&step) {
+                break;
+            }
+        }
+        let front = collapse.front(0.01).position;
+        println!("{}: {front} {expected}", collapse.time());
+        assert!((front / expected - 1.0).abs() < 0.01, "{front} {expected}");
+    }
+}
