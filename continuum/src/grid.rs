@@ -123,14 +123,6 @@ impl Axis {
         }
     }
 
-    /// Whether the same holds at both ends of the axis.
-    pub(crate) fn is_alike(&self) -> bool {
-        match self {
-            Axis::Bounded { low, high, .. } => low == high,
-            Axis::Flat | Axis::Periodic { .. } => true,
-        }
-    }
-
     /// Number of faces normal to the axis, boundary faces included.
     fn faces(&self) -> usize {
         match self {

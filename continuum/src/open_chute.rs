@@ -172,6 +172,8 @@ pub struct OpenChute<
     units: Units,
     flow: SurfaceFlow<L, D, C, V>,
     start_volume: f64,
+    /// Whether all of the breadth is computed.
+    is_whole: bool,
 }
 
 impl<L: ShearLaw + Clone> OpenChute<L> {
@@ -247,6 +249,7 @@ impl<L: ShearLaw + Clone, const D: usize, const C: usize, const V: usize> OpenCh
             case: case.clone(),
             units,
             start_volume: flow.volume(),
+            is_whole: true,
             flow,
         })
     }

@@ -26,6 +26,9 @@ const TASKS: usize = 32;
 /// Looks at what is to be done between two looks at what the pool has.
 const LOOKS: u32 = 32;
 
+/// Looks in vain, some tens of microseconds of them, after which a thread that was not taken on goes.
+const BRIEF: u32 = 3000;
+
 /// Looks in vain after which a thread gives way to others.
 const PATIENCE: u32 = 2000;
 
@@ -143,9 +146,14 @@ impl Team {
 
     fn wait_for_tasks(&self, own: usize) {
         // See the module. What this thread may be within was given to the pool after others ceased to be taken on,
-        // and they are not until it is done.
-        if !self.takes_on.load(Ordering::Acquire) {
-            return;
+        // and they are not until it is done: it does not wait for long. One that comes before the first tasks does.
+        let mut looks = 0;
+        while !self.takes_on.load(Ordering::Acquire) {
+            if looks >= BRIEF || self.over.load(Ordering::Acquire) {
+                return;
+            }
+            looks += 1;
+            std::hint::spin_loop();
         }
         self.helpers.fetch_add(1, Ordering::AcqRel);
         let _leave = Leave(self);
@@ -399,33 +407,32 @@ mod tests {
         });
     }
 
-    /// Somebody is taken on while tasks are under way.
-    #[test]
-    fn a_thread_that_comes_late_stands_by() {
-        let team = Team::default();
-        in_pool(2, || {
-            team.with_helpers(1, || {
-                let is_here = |_: &mut usize| {
-                    while !team.stands_by() {
-                        std::thread::yield_now();
-                    }
-                };
-                team.each(true, &mut [0, 1], &is_here);
-            });
-        });
-        assert!(!team.stands_by());
+    /// Waits until somebody stands by, but not for ever.
+    fn wait_for_a_helper(team: &Team) {
+        let start = std::time::Instant::now();
+        while !team.stands_by() && start.elapsed().as_millis() < 100 {
+            std::thread::yield_now();
+        }
     }
 
+    /// Somebody is taken on while tasks are under way, and does what else there is in the pool. One that comes too early is
+    /// sent away, so there are several calls.
     #[test]
-    fn helpers_do_what_else_there_is_in_the_pool() {
+    fn a_thread_stands_by_and_does_what_else_there_is() {
         let team = Team::default();
-        let sum = in_pool(2, || {
-            team.with_helpers(1, || {
-                let (a, b) = rayon::join(|| 1, || 2);
-                a + b
-            })
+        let mut stood_by = 0;
+        in_pool(2, || {
+            for _ in 0..50 {
+                team.with_helpers(1, || {
+                    team.each(true, &mut [0, 1], &|_| wait_for_a_helper(&team));
+                    stood_by += u32::from(team.stands_by());
+                    let (a, b) = rayon::join(|| 1, || 2);
+                    assert_eq!(a + b, 3);
+                });
+                assert!(!team.stands_by());
+            }
         });
-        assert_eq!(sum, 3);
+        assert!(stood_by > 0);
     }
 
     #[test]

@@ -113,7 +113,7 @@ fn chutes_are_planned_and_bad_ones_refused_by_key() {
         ),
         (
             "in_space={breadth=0.1,cells=200}",
-            "grid.cells",
+            "in_space.cells",
             "at most 40000",
         ),
     ] {

@@ -287,7 +287,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             if (0..D).any(|axis| self.slides(axis, at)) {
                 self.add_sliding(cell, index, side, [filled(), share], points, places);
             }
-            // On an open end nothing slides: what crosses it is given, or moves with the column before it.
+            // No thin layer ends at an open end: what crosses it is given, or moves with the column before it.
             let layer = match self.is_open(at[0]) {
                 true => None,
                 false => self.under_layer(cell, side, share, filled),

@@ -106,10 +106,13 @@ impl<L: ShearLaw + Clone> SpaceChute<L> {
         let (law, g) = (case.rheology.in_units(&case.units()), case.slope.sin_cos());
         let start = case.start(across.cells);
         let flow = SpaceFlow::in_space(grid, start, law, [g.0, 0.0, -g.1], *options)?;
-        Self::fed(case, flow, across.cells)
+        let mut chute = Self::fed(case, flow, across.cells)?;
+        chute.is_whole = across.whole;
+        Ok(chute)
     }
+
     /// Whether all of the breadth is computed, so that the chute has a mirror image.
     pub fn is_whole(&self) -> bool {
-        self.flow.grid().axes()[1].is_alike()
+        self.is_whole
     }
 }

@@ -146,10 +146,15 @@ impl OpenChuteScene {
             None => LARGEST_CHUTE,
         };
         if filled > most {
+            let across = self.in_space.as_ref();
+            let (key, value) = match across.filter(|k| self.cells_across(k) > self.cells()) {
+                Some(across) => ("in_space.cells", across.cells),
+                None => ("grid.cells", self.grid.cells),
+            };
             return Err(out_of_range(
                 origin,
-                "grid.cells",
-                self.grid.cells.to_string(),
+                key,
+                value.to_string(),
                 format!(
                     "at most {most} cells in the chute, here {filled:.0} at scale {} and grid.length_scaled = {}",
                     self.scale, self.grid.length_scaled

@@ -115,10 +115,14 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         let axis = &self.grid.axes()[0];
         let can_open = |&side: &usize| can_open(axis.boundary_at(side * axis.cells()).as_ref());
         require(
-            self.bed.is_none() && sides.iter().all(can_open),
-            "inflow",
+            self.bed.is_none() && self.ends.is_none() && sides.iter().all(can_open),
+            if inflow.is_some() {
+                "inflow"
+            } else {
+                "outflow"
+            },
             axis.spacing() * axis.cells() as f64,
-            "a grid of this length with smooth walls at the open ends of x and a level floor",
+            "a grid of this length with smooth walls at the ends of x to be opened and a level floor",
         )?;
         let ends = OpenEnds {
             inflow,

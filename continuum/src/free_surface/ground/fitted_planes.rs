@@ -46,7 +46,9 @@ impl<const D: usize> Ground<D> {
             if misses.1 <= EXACT {
                 break;
             }
-            let mut turn = self.turn(around, &plane, &misses)?;
+            let Some(mut turn) = self.turn(around, &plane, &misses) else {
+                break;
+            };
             let before = misses.1;
             for _ in 0..4 {
                 let normal = std::array::from_fn(|axis| plane.normal[axis] + turn[axis]);

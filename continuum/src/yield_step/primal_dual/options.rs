@@ -8,7 +8,7 @@ use crate::error::{Error, require};
 /// iteratively: a tighter one saves no iteration.
 const NEWTON_TOLERANCE: f64 = 1e-3;
 
-/// Settings of [`PrimalDual`]; times and lengths in natural units.
+/// Settings of [`PrimalDual`](super::PrimalDual); times and lengths in natural units.
 #[derive(Debug, Clone, Copy, PartialEq, Serialize, Deserialize)]
 #[serde(deny_unknown_fields, default)]
 pub struct PrimalDualOptions {

@@ -80,6 +80,10 @@ pub(super) fn check(specs: &[MaterialEdgeSpec]) -> Result<(), OverlapError> {
                 "that of the other edges, as load_time",
             );
         }
+        if own.uncoupled != other.uncoupled {
+            let value = f64::from(u8::from(other.uncoupled));
+            return refuse("uncoupled", value, "that of the other edges");
+        }
         match (low.side, high.side) {
             (Side::Below, Side::Above) => {
                 if apart <= low.zones()[1] + high.zones()[1] {
@@ -94,13 +98,15 @@ pub(super) fn check(specs: &[MaterialEdgeSpec]) -> Result<(), OverlapError> {
                         "at least three cells between two edges, the lower one first",
                     );
                 }
-                let overlaps = apart + low.zones()[1];
-                if (high.place - high.back - overlaps).abs() > 1e-9 * overlaps {
-                    return refuse(
-                        "back",
-                        high.back,
-                        "where the overlap at the other end of the continuum ends",
-                    );
+                for (edge, other) in [(high, low), (low, high)] {
+                    let overlaps = apart + other.zones()[1];
+                    if (edge.place - edge.back - overlaps).abs() > 1e-9 * overlaps {
+                        return refuse(
+                            "back",
+                            edge.back,
+                            "where the overlap at the other end of the continuum ends",
+                        );
+                    }
                 }
             }
             _ => {

@@ -52,7 +52,7 @@ impl Continuum {
         (places, heights)
     }
 
-    /// Height at a place along x (m); beyond the ends of its grid that at its ends.
+    /// Height at a place along x (m); before the start of its grid that at its start, beyond its end 0.
     pub(super) fn height(&self, x: f64) -> f64 {
         let cell = (self.spec.side.along(x) - self.cells.low) / self.cells.spacing;
         let (_, heights) = self.collapse.profile();
