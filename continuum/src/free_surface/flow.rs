@@ -15,7 +15,6 @@ pub use state::{SpaceFields, SpaceState, Spent, SurfaceOptions, SurfaceState, Su
 
 use super::faces::ACTIVE;
 use super::ground::Ground;
-use super::ground::shores::Shores;
 use super::open_ends::OpenEnds;
 use super::outside::Outside;
 use super::plane::Plane;
@@ -58,7 +57,6 @@ pub struct SurfaceFlow<
     state: SurfaceState<D, C>,
     saved: SurfaceState<D, C>,
     planes: Vec<Option<Plane>>,
-    shores: Shores,
     transport: Transport<D>,
     /// The velocity that carries material in a step.
     carrier: Velocity<D>,

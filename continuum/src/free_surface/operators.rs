@@ -9,7 +9,6 @@
 
 use super::faces::{ACTIVE, ALIKE, Face, Faces, weight_onto};
 use super::fraction::volume_in;
-use super::ground::shores::Shores;
 use super::open_ends::OpenEnds;
 use super::outside::Outside;
 use super::plane::Plane;
@@ -25,8 +24,6 @@ use crate::wall_friction::{PointLaw, SideWalls};
 
 /// Smallest θ in the pressure gradient and in the pressure at walls.
 const NEAREST_SURFACE: f64 = 0.005;
-/// Smallest fall of the pressure over a cell towards a shore, over that in the active one, where planes do not fit.
-const LEAST_FALL: f64 = 0.2;
 /// Smallest θ in the extrapolation of pressure beyond the surface.
 pub(super) const NEAREST_EXTRAPOLATION: f64 = 0.25;
 /// An axis along which gravity has less than this part of all of it lies across upright faces.
@@ -49,8 +46,6 @@ pub(crate) struct Material<'a, const D: usize = DIMENSIONS, const C: usize = COM
     pub topology: &'a Topology<D>,
     pub fractions: &'a [f64],
     pub planes: &'a [Option<Plane>],
-    /// The surface where it meets ground.
-    pub shores: &'a Shores,
     pub faces: &'a Faces<D>,
     /// Walls beside the plane, which rub.
     pub side_walls: Option<SideWalls>,
@@ -136,29 +131,29 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
 
     /// The surface in a cell. In space dust has none: where some of it lies is a matter of round-off.
     fn plane(&self, cell: usize) -> Option<&Plane> {
-        let plane = self.shores.plane(cell).or(self.planes[cell].as_ref());
+        let plane = self.planes[cell].as_ref();
         plane.filter(|_| D == 2 || self.fractions[cell] > EMPTY)
-    }
-
-    /// Depth below the surface, in cells along its normal, of the centre of an active cell and that of its inactive
-    /// neighbour along an axis.
-    fn depths_of_centres(&self, active: usize, other: usize, axis: usize, side: usize) -> [f64; 2] {
-        let mut step = [0.0; D];
-        step[axis] = if side == 1 { 1.0 } else { -1.0 };
-        let back = step.map(|s| -s);
-        let here = [0.0; D];
-        match (self.plane(active), self.plane(other)) {
-            (Some(a), Some(b)) => [depth_of_centre(a, here), depth_of_centre(b, here)],
-            (Some(a), None) => [depth_of_centre(a, here), depth_of_centre(a, step)],
-            (None, Some(b)) => [depth_of_centre(b, back), depth_of_centre(b, here)],
-            (None, None) => [0.5, -0.5],
-        }
     }
 
     /// Distance θ, in cells, from the centre of an active cell to the surface on the way to its
     /// inactive neighbour along an axis.
-    fn surface_distance(&self, active: usize, other: usize, axis: usize, side: usize) -> f64 {
-        let [inner, outer] = self.depths_of_centres(active, other, axis, side);
+    pub(super) fn surface_distance(
+        &self,
+        active: usize,
+        other: usize,
+        axis: usize,
+        side: usize,
+    ) -> f64 {
+        let mut step = [0.0; D];
+        step[axis] = if side == 1 { 1.0 } else { -1.0 };
+        let back = step.map(|s| -s);
+        let here = [0.0; D];
+        let (inner, outer) = match (self.plane(active), self.plane(other)) {
+            (Some(a), Some(b)) => (depth_of_centre(a, here), depth_of_centre(b, here)),
+            (Some(a), None) => (depth_of_centre(a, here), depth_of_centre(a, step)),
+            (None, Some(b)) => (depth_of_centre(b, back), depth_of_centre(b, here)),
+            (None, None) => (0.5, -0.5),
+        };
         if inner <= 0.0 {
             NEAREST_SURFACE
         } else if outer >= 0.0 {
@@ -166,22 +161,6 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         } else {
             (inner / (inner - outer)).clamp(NEAREST_SURFACE, 1.0)
         }
-    }
-
-    /// What lies beyond the surface of an active cell on the way to its inactive neighbour along an axis.
-    pub(super) fn beyond(&self, active: usize, other: usize, axis: usize, side: usize) -> Beyond {
-        if self.faces.shares.is_some() {
-            let [here, there] = [active, other].map(|cell| match self.planes[cell] {
-                Some(_) => self.shores.at(cell).map_or(0.0, |shore| shore.weight),
-                None => 1.0,
-            });
-            let [inner, outer] = self.depths_of_centres(active, other, axis, side);
-            if inner > 0.0 && outer >= 0.0 {
-                let least = (1.0 - here.min(there)) * LEAST_FALL;
-                return Beyond::Shore((outer / inner).min(1.0 - least));
-            }
-        }
-        Beyond::Air(self.surface_distance(active, other, axis, side))
     }
 
     /// Divergence of active cells, and the force of their pressure.
@@ -514,8 +493,10 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         if self.stands && is_free && self.acceleration[axis].abs() <= UPRIGHT * most {
             return (self.faces.pressure[inner], 1.0);
         }
-        let beyond = self.beyond(inner, cell, axis, 1 - side);
-        (self.faces.pressure[inner], beyond.extrapolation(nearest))
+        let distance = self
+            .surface_distance(inner, cell, axis, 1 - side)
+            .max(nearest);
+        (self.faces.pressure[inner], (distance - 1.0) / distance)
     }
 
     /// The same pressure where several ways may be alike, as on the diagonal of what mirrors itself there: the
@@ -636,44 +617,15 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 point.add_pressure(self.faces.pressure[next], -0.5 * share);
                 return;
             }
-            next => self.beyond(cell, next, axis, 1 - side).extrapolation(0.0),
+            next => {
+                let distance = self.surface_distance(cell, next, axis, 1 - side);
+                (distance - 1.0) / distance
+            }
         };
         point.add_pressure(first, 1.5 * share);
         point.add_pressure(first, -0.5 * share * factor);
         if next != NONE {
             point.pressure_offset -= 0.5 * share * self.pressure_beyond(next, factor);
-        }
-    }
-}
-
-/// Beyond the surface of an active cell, seen along an axis.
-#[derive(Debug, Clone, Copy)]
-pub(super) enum Beyond {
-    /// The surface at the distance θ, in cells.
-    Air(f64),
-    /// The shore. Ground takes up so much of the cell beyond that it is not active though its centre lies below the surface: the
-    /// pressure there over that in the active cell, as their depths. (Where planes do not fit it is held back, else a cell's
-    /// pressure may have nothing left to push, and the step no solution.)
-    Shore(f64),
-}
-
-impl Beyond {
-    /// By how much the pressure falls over a cell, over that in the active one.
-    pub(super) fn fall(self) -> f64 {
-        match self {
-            Self::Air(distance) => 1.0 / distance,
-            Self::Shore(there) => 1.0 - there,
-        }
-    }
-
-    /// The pressure a cell away over that in the active one, with θ not below `nearest`.
-    fn extrapolation(self, nearest: f64) -> f64 {
-        match self {
-            Self::Air(distance) => {
-                let distance = distance.max(nearest);
-                (distance - 1.0) / distance
-            }
-            Self::Shore(there) => there,
         }
     }
 }

@@ -42,8 +42,6 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                         *plane = None;
                     }
                 }
-                self.shores
-                    .find(ground, &self.topology, fractions, &self.planes);
                 faces_over(ground, &self.topology, fractions, acceleration, thin_layer)
             }
         };
@@ -55,7 +53,6 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             topology: &self.topology,
             fractions,
             planes: &self.planes,
-            shores: &self.shores,
             faces: &faces,
             side_walls: self.side_walls,
             ends: self.ends.as_ref(),
