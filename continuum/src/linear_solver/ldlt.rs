@@ -364,18 +364,6 @@ mod tests {
         assert!(widest > 100, "{widest}: no supernode of several blocks");
     }
 
-    /// Coefficients that are not finite are an error at once, in narrow supernodes and in wide ones.
-    #[test]
-    fn what_is_not_finite_is_an_error() {
-        for (side, at) in [(7, 0), (7, 40), (19, 5), (19, 200)] {
-            let mut membrane = membrane(side, false, false);
-            let slot = membrane.pattern.col_ptr()[at];
-            membrane.values[slot] = f64::NAN;
-            let (pattern, values) = (membrane.pattern.as_ref(), &membrane.values);
-            assert!(membrane.factors.factorise(pattern, values).is_err());
-        }
-    }
-
     /// What the processor is told to do gives the bits of plain loops.
     #[test]
     fn every_processor_gives_the_same_bits() {
