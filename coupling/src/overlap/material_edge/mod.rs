@@ -32,6 +32,7 @@ mod exchange;
 mod labels;
 mod layout;
 mod memory;
+mod oracle;
 #[cfg(test)]
 mod rotation;
 mod rows;
