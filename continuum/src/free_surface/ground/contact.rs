@@ -104,8 +104,8 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 found.add(p, 2.0);
                 found.add(pressure(behind), -1.0);
             } else if behind != NONE && ground.master[behind] == behind {
-                let distance = self.surface_distance(beside, behind, axis, side);
-                found.add(p, 1.0 + 1.0 / distance);
+                let fall = self.beyond(beside, behind, axis, side).fall();
+                found.add(p, 1.0 + fall);
             } else {
                 found.add(p, 1.0);
             }
@@ -216,8 +216,8 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             point.add_pressure(p, 1.0 + depth);
             point.add_pressure(beyond, -depth);
         } else if next != NONE && ground.master[next] == next {
-            let distance = self.surface_distance(master, next, axis, away);
-            point.add_pressure(p, 1.0 + depth / distance);
+            let fall = self.beyond(master, next, axis, away).fall();
+            point.add_pressure(p, 1.0 + depth * fall);
         } else {
             point.add_pressure(p, 1.0);
         }

@@ -111,12 +111,12 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                         };
                         let mut force = 0.0;
                         if mass > 0.0 {
-                            let distance = if self.faces.pressure[other] == NONE {
-                                self.surface_distance(member, other, axis, side)
+                            let fall = if self.faces.pressure[other] == NONE {
+                                self.beyond(member, other, axis, side).fall()
                             } else {
                                 1.0
                             };
-                            force = outwards * mass / (distance * self.grid.axes()[axis].spacing());
+                            force = outwards * mass * fall / self.grid.axes()[axis].spacing();
                         }
                         for (j, share) in self.faces.moved_by(axis, face, axis) {
                             if j != NONE {
