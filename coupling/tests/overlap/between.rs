@@ -83,7 +83,10 @@ fn edges_that_enclose_no_continuum_are_refused() {
     let mut simulation = joined(settled().to_vec(), true, &core(false, ENDS, None)).simulation;
     let mut refused = |specs: &[MaterialEdgeSpec]| {
         let simulation: &mut Simulation = &mut simulation;
-        GrainZone::cut(specs, simulation).err().unwrap().to_string()
+        GrainZone::cut(specs, None, simulation)
+            .err()
+            .unwrap()
+            .to_string()
     };
     assert!(refused(&narrow).contains("three cells between"));
     assert!(refused(&odd).contains("other end of the continuum"));

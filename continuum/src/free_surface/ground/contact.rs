@@ -74,6 +74,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 let ways = self.pressures_at(cell, NEAREST_EXTRAPOLATION);
                 for (p, factor) in ways.into_iter().flatten() {
                     found.add(p, factor);
+                    found.known += self.pressure_beyond(cell, factor);
                 }
             }
             return found;
@@ -104,8 +105,9 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 found.add(p, 2.0);
                 found.add(pressure(behind), -1.0);
             } else if behind != NONE && ground.master[behind] == behind {
-                let distance = self.surface_distance(beside, behind, axis, side);
-                found.add(p, 1.0 + 1.0 / distance);
+                let factor = 1.0 + 1.0 / self.surface_distance(beside, behind, axis, side);
+                found.add(p, factor);
+                found.known += self.pressure_beyond(behind, factor);
             } else {
                 found.add(p, 1.0);
             }
@@ -217,7 +219,9 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             point.add_pressure(beyond, -depth);
         } else if next != NONE && ground.master[next] == next {
             let distance = self.surface_distance(master, next, axis, away);
-            point.add_pressure(p, 1.0 + depth / distance);
+            let factor = 1.0 + depth / distance;
+            point.add_pressure(p, factor);
+            point.pressure_offset += self.pressure_beyond(next, factor);
         } else {
             point.add_pressure(p, 1.0);
         }

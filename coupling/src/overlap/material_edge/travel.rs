@@ -12,7 +12,7 @@
 //!
 //! A move gives all labels anew, by where grains are: what has mixed since they were given is cut along a clean edge.
 //! Each return doubles the rest that the next move outwards waits for: the two thresholds and this keep the edge from
-//! going to and fro. A move inwards that a budget of grains does not allow is refused and counted. Mass changes hands
+//! going to and fro. A move inwards that a budget of grains does not allow is refused and counted, and so is one to where the ground is not level. Mass changes hands
 //! at the edge alone, by whole strips; momentum that goes with it is booked. Every move is kept with its reason
 //! ([`Move`]).
 
@@ -89,15 +89,18 @@ pub(super) struct Journey {
     pub moves: Vec<Move>,
     /// Exchanges for which the grains beside the edge have rested.
     pub resting: f64,
-    /// Moves inwards so far, and those refused.
+    /// Moves inwards so far, those that a budget refused, and those for which the ground was not level.
     pub returns: f64,
     pub refused: f64,
+    pub stopped: f64,
     /// Grains that were laid on top because their place was taken.
     pub displaced: f64,
 }
 
 /// Share of the sum of radii by which a grain that is put back may overlap with one that is there.
 const DEEPEST: f64 = 0.05;
+/// Part of a full cell's mass in grains of the overlap from which on a row has some.
+const COVERED: f64 = 0.3;
 
 /// Which strip behind the edge a grain belongs to, from 0; none: it stays.
 fn strip_of(label: Option<f64>, fixed: bool, floor: f64, width: f64) -> Option<usize> {
@@ -118,6 +121,28 @@ impl MaterialEdge {
     /// Moves inwards that the budget did not allow.
     pub fn refused_moves(&self) -> f64 {
         self.journey.refused
+    }
+
+    /// Moves inwards that ended before they were made: the ground there is not level.
+    pub fn stopped_moves(&self) -> f64 {
+        self.journey.stopped
+    }
+
+    /// Where it has come to ground that is not level, if it has (m along x), and up to where the ground is level.
+    pub fn beyond_level_ground(&self) -> Option<[f64; 2]> {
+        let least = self.least_place();
+        let ends = [least, self.level].map(|place| self.spec.side.along(place));
+        (least < self.level).then_some(ends)
+    }
+
+    /// Least place of the edge in rows with grains of its overlap (m).
+    fn least_place(&self) -> f64 {
+        let [columns, _] = self.cells.counts;
+        let covers = self.sums.cover.chunks(columns);
+        let full = self.full();
+        let rows = self.held.rows.iter().zip(covers);
+        let there = rows.filter(|(_, covers)| covers.iter().any(|c| c.copied > COVERED * full));
+        there.fold(f64::INFINITY, |least, (row, _)| least.min(row.place))
     }
 
     /// Grains that were laid on top of the heap because their place was taken when they were put back.
@@ -324,6 +349,10 @@ impl MaterialEdge {
         speed: f64,
         simulation: &mut Simulation,
     ) -> Result<bool, OverlapError> {
+        if self.least_place() - travel.width < self.level {
+            self.journey.stopped += 1.0;
+            return Ok(false);
+        }
         let strips = &self.journey.strips;
         let more = strips.last().map_or(0, |patch| patch.grains.len());
         if (simulation.grain_count() + more) as f64 > travel.budget {
