@@ -1,8 +1,8 @@
 //! Runs that are killed or stopped at any moment go on to the same state.
 
 use crate::command::{
-    CORE, INSTALMENTS, INTERVAL, MOVING_EDGE, SMALL_COMET_CLIFF, SMALL_HYBRID, SMALL_JOINED_COLUMN,
-    colluvium, hash, pause, succeed, table,
+    CORE, FRONT_ON_A_SLOPE, INSTALMENTS, INTERVAL, MOVING_EDGE, SMALL_COMET_CLIFF, SMALL_HYBRID,
+    SMALL_JOINED_COLUMN, colluvium, hash, pause, succeed, table,
 };
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -202,6 +202,11 @@ fn a_killed_interval_of_grains_goes_on_in_the_middle_of_an_exchange() {
 #[test]
 fn a_killed_continuum_between_grains_goes_on_in_the_middle_of_an_exchange() {
     killed_between_edges(CORE, 23);
+}
+
+#[test]
+fn a_killed_front_over_a_slope_goes_on_in_the_middle_of_an_exchange() {
+    killed_between_edges(FRONT_ON_A_SLOPE, 29);
 }
 
 /// Before and after its debris has become a continuum.

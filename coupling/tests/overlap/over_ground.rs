@@ -173,7 +173,7 @@ fn a_front_over_ground_keeps_its_books() {
         .filter(|f| f.fraction > 0.5);
     let lowest = lowest.fold(0.0, |low: f64, f| low.min(f.lower[1]));
     println!(
-        "lowest matter {lowest:.2}, stopped {}",
+        "lowest matter {lowest:.2}, stopped {:?}",
         joined.edge().stopped_moves()
     );
     assert!(lowest < -2.0, "{lowest}");

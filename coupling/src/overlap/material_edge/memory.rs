@@ -67,7 +67,8 @@ impl MaterialEdge {
             journey.resting,
             journey.returns,
             journey.refused,
-            journey.stopped,
+            journey.stopped[0],
+            journey.stopped[1],
             journey.displaced,
             journey.strips.len() as f64,
         ]);
@@ -133,7 +134,19 @@ impl MaterialEdge {
         let Some(base) = take() else {
             return Ok(None);
         };
-        let Some(&[at, resting, returns, refused, stopped, displaced, strips]) = take() else {
+        let Some(
+            &[
+                at,
+                resting,
+                returns,
+                refused,
+                stopped,
+                first,
+                displaced,
+                strips,
+            ],
+        ) = take()
+        else {
             return Ok(None);
         };
         let Some(moves) = take() else {
@@ -154,7 +167,7 @@ impl MaterialEdge {
             resting,
             returns,
             refused,
-            stopped,
+            stopped: [stopped, first],
             displaced,
         };
         let Some([stress, accelerations, spins, edge_rows, handshake, owed]) =

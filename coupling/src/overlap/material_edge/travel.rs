@@ -92,7 +92,8 @@ pub(super) struct Journey {
     /// Moves inwards so far, those that a budget refused, and those for which the ground was not level.
     pub returns: f64,
     pub refused: f64,
-    pub stopped: f64,
+    /// How many, and when the first (s).
+    pub stopped: [f64; 2],
     /// Grains that were laid on top because their place was taken.
     pub displaced: f64,
 }
@@ -123,9 +124,10 @@ impl MaterialEdge {
         self.journey.refused
     }
 
-    /// Moves inwards that ended before they were made: the ground there is not level.
-    pub fn stopped_moves(&self) -> f64 {
-        self.journey.stopped
+    /// Moves inwards that were not made, as the ground there is not level: how many, and when the first (s).
+    pub fn stopped_moves(&self) -> Option<(f64, f64)> {
+        let [count, first] = self.journey.stopped;
+        (count > 0.0).then_some((count, first))
     }
 
     /// Where it has come to ground that is not level, if it has (m along x), and up to where the ground is level.
@@ -350,7 +352,11 @@ impl MaterialEdge {
         simulation: &mut Simulation,
     ) -> Result<bool, OverlapError> {
         if self.least_place() - travel.width < self.level {
-            self.journey.stopped += 1.0;
+            let [count, first] = &mut self.journey.stopped;
+            if *count == 0.0 {
+                *first = simulation.time();
+            }
+            *count += 1.0;
             return Ok(false);
         }
         let strips = &self.journey.strips;

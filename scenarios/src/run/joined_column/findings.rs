@@ -33,7 +33,11 @@ impl JoinedColumn<'_> {
         let left_out = scene.continua().into_iter().map(|[low, high]| {
             let ends = [scene.width(), scene.length()];
             let [column, ground] = ends.map(|end| high.unwrap_or(end) - low.unwrap_or(0.0));
-            per_area * scene.height * column + floor * ground
+            let lip = match high {
+                None => scene.section(scene.height) - scene.height * scene.width(),
+                Some(_) => 0.0,
+            };
+            per_area * (scene.height * column + lip) + floor * ground
         });
         (all - left_out.sum::<f64>()) / all
     }
@@ -93,6 +97,7 @@ impl JoinedColumn<'_> {
                 }
             ),
         ));
+        lines.extend(scene.terrain_in_words());
         lines
     }
 
@@ -101,6 +106,10 @@ impl JoinedColumn<'_> {
         let scene = self.scene;
         let d = scene.grains.diameter;
         let mut names = self.names().into_iter();
+        let over = match scene.terrain {
+            Some(_) => ", over the terrain",
+            None => "",
+        };
         let mut named = |place: f64| {
             let name = names.next().unwrap_or_default().replace('_', " ");
             format!("the {name} at {place:.4} m ({:.1} d)", place / d)
@@ -116,7 +125,7 @@ impl JoinedColumn<'_> {
             };
             match ends[1] {
                 Some(high) => format!("continuum from {from} to {}", named(high)),
-                None => format!("continuum from {from} on, with the column's front"),
+                None => format!("continuum from {from} on, with the column's front{over}"),
             }
         };
         let continua: Vec<String> = scene.continua().into_iter().map(of).collect();
@@ -325,7 +334,7 @@ impl JoinedColumn<'_> {
             (
                 "continuum_walls",
                 walls,
-                "that the continuum had from walls, floor and the stress on its surface: what is left of its momentum",
+                "that the continuum had from walls, floor or ground and the stress on its surface: what is left of its momentum",
             ),
         ] {
             for (axis, value) in [("x", x), ("z", z)] {
@@ -551,6 +560,14 @@ fn moves(zone: &GrainZone, summary: &mut Summary) -> Option<Table> {
         edges.iter().map(MaterialEdge::refused_moves).sum::<f64>(),
         edges.iter().map(MaterialEdge::displaced).sum::<f64>()
     ));
+    for edge in edges {
+        if let Some((times, first)) = edge.stopped_moves() {
+            summary.remarks.push(format!(
+                "{times} moves inwards of the edge that is now at {:.4} m, the first at t = {first:.4} s, were not made: the ground there is not level.",
+                edge.spec().side.along(edge.spec().place + edge.travelled())
+            ));
+        }
+    }
     let reason = |m: &Move| match m.mass > 0.0 {
         true => Reason::Speed,
         false => Reason::Rest,
