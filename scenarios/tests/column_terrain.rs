@@ -74,6 +74,7 @@ fn a_front_of_continuum_runs_down_a_slope_as_grains_do() {
 
 /// Over a step, and with a second continuum behind the grains.
 #[test]
+#[ignore = "half a minute: a wider column, twice"]
 fn a_front_of_continuum_runs_over_a_step_as_grains_do() {
     front_as_grains(&[
         "aspect=0.25",
@@ -184,14 +185,20 @@ fn the_plan_knows_the_ground_of_a_front() {
 fn a_joint_stays_on_level_ground() {
     let folder = tempfile::tempdir().unwrap();
     let near = "terrain.profile=[[0,0],[2.8,0],[2.8,-0.5],[6,-0.5]]";
-    let sets = [near, "zones.edge_scaled=1.75"];
-    let stopped = colluvium(folder.path(), &arguments("x", &sets));
-    let message = String::from_utf8_lossy(&stopped.stderr).into_owned();
-    assert_eq!(stopped.status.code(), Some(1), "{message}");
-    assert!(
-        message.contains("no longer level (2.8 m)") && message.contains("zones.edge_scaled"),
-        "{message}"
-    );
+    for (zones, words) in [
+        (
+            "zones.edge_scaled=1.75",
+            ["begin farther back", "zones.edge_scaled"],
+        ),
+        ("zones.x=[[0, 2.4]]", ["end farther back", "zones.x"]),
+    ] {
+        let stopped = colluvium(folder.path(), &arguments("x", &[near, zones]));
+        let message = String::from_utf8_lossy(&stopped.stderr).into_owned();
+        assert_eq!(stopped.status.code(), Some(1), "{message}");
+        assert!(message.contains("no longer level (2.8 m)"), "{message}");
+        assert!(words.iter().all(|word| message.contains(word)), "{message}");
+        std::fs::remove_dir_all(folder.path().join("x")).unwrap();
+    }
 }
 
 #[test]

@@ -51,6 +51,12 @@ fn joined(specs: &[MaterialEdgeSpec], ground: Option<&CollapseGround>) -> Joined
     Joined::cut_over(simulation, specs, ground)
 }
 
+/// The same without a wall beyond the column's foot.
+fn joined_open(specs: &[MaterialEdgeSpec], ground: &CollapseGround) -> Joined {
+    let simulation = Simulation::new(setup_of(LENGTH, settled().to_vec(), false)).unwrap();
+    Joined::cut_over(simulation, specs, Some(ground))
+}
+
 /// A bed behind a bank of ground, beyond which that falls away, rests as one behind a wall of the grid does, and ground pushes as the
 /// wall pushes.
 #[test]
@@ -91,11 +97,11 @@ fn a_bed_behind_a_bank_stays_at_rest() {
     let [ground, wall] = found;
     for (own, other) in ground.iter().zip(wall) {
         assert!(
-            (own - other).abs() < 0.02 * wall[2].abs(),
+            (own - other).abs() < 2e-3 * wall[2].abs(),
             "{ground:?} {wall:?}"
         );
     }
-    assert!((ground[0] / wall[0] - 1.0).abs() < 0.02);
+    assert!((ground[0] / wall[0] - 1.0).abs() < 0.01);
 }
 
 /// Places and depths of the continuum's heap, and the handshake surface in the rows over the floor.
@@ -129,7 +135,7 @@ fn level_ground_is_the_level_floor() {
     };
     let ([level, step], edges) = ([off(level), off(step)], [level.1.len(), step.1.len()]);
     println!("heap and handshake off: level {level:?}, step {step:?}, rows {edges:?}");
-    assert!(level[0] < 0.01 && level[1] < 0.01, "{level:?}");
+    assert!(level[0] < 4e-3 && level[1] < 6e-3, "{level:?}");
     assert!(step[0] > 5.0 * level[0], "{step:?}");
 }
 
@@ -150,7 +156,7 @@ fn a_mirrored_front_over_mirrored_ground_bears_mirrored_loads() {
     mirror_over(
         (&[own], &[image]),
         [Some(&grounds[0]), Some(&grounds[1])],
-        1e-7,
+        1e-10,
     );
 }
 
@@ -178,6 +184,46 @@ fn a_front_over_ground_keeps_its_books() {
     );
     assert!(lowest < -2.0, "{lowest}");
     assert_eq!(joined.edge().beyond_level_ground(), None);
+}
+
+/// Narrow strips follow a flow that wakes late towards the foot: where the overlap would come to lie beyond the level ground, moves
+/// are not made, and counted.
+#[test]
+fn an_edge_does_not_move_to_where_the_ground_is_not_level() {
+    let shore = |foot: f64| {
+        ground(&[
+            [0.0, 0.0],
+            [foot, 0.0],
+            [foot + 4.0, -3.0],
+            [FAR + 5.0, -3.0],
+        ])
+    };
+    let grounds = [shore(LENGTH + 0.1), shore(FAR - 5.0)];
+    for wake in [0.4, 0.7, 1.0] {
+        let narrow = Travel {
+            width: 1.0,
+            wake,
+            ..TRAVEL
+        };
+        let spec = MaterialEdgeSpec {
+            place: -28.0,
+            ..front(false, Some(narrow))
+        };
+        let [near, far] = [0, 1].map(|k| {
+            let mut joined = joined_open(&[spec], &grounds[k]);
+            joined.advance(11.0, 1.0);
+            let edge = joined.edge();
+            let travelled = edge.travelled();
+            println!(
+                "wake {wake}: edge moved {travelled}, stopped {:?}, beyond {:?}, places {:.1?}",
+                edge.stopped_moves(),
+                edge.beyond_level_ground(),
+                edge.handshake()
+            );
+            (travelled, edge.stopped_moves())
+        });
+        println!("{near:?} {far:?}");
+    }
 }
 
 #[test]

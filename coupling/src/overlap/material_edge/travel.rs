@@ -130,9 +130,18 @@ impl MaterialEdge {
         (count > 0.0).then_some((count, first))
     }
 
-    /// Where it has come to ground that is not level, if it has (m along x), and up to where the ground is level.
+    /// Where it has come to ground that is not level, if it has (m along x), and up to where the ground is level: where the edge is, or
+    /// more of its grains than fill a cell.
     pub fn beyond_level_ground(&self) -> Option<[f64; 2]> {
-        let least = self.least_place();
+        let grains = self.sighting.snapshot.grains.iter();
+        let beyond = grains.filter(|g| self.labels.of(g).is_some() && g.position.x < self.level);
+        let [mass, farthest] = beyond.fold([0.0, self.level], |[mass, farthest], g| {
+            [mass + g.mass, g.position.x.min(farthest)]
+        });
+        let least = match mass > self.full() {
+            true => farthest,
+            false => self.least_place(),
+        };
         let ends = [least, self.level].map(|place| self.spec.side.along(place));
         (least < self.level).then_some(ends)
     }
