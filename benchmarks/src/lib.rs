@@ -1,5 +1,6 @@
 //! Cases that benchmarks share, so that speed is measured on what the tests check.
 
+pub mod columns;
 pub mod peers;
 
 use colluvium_continuum::bagnold::BagnoldCase;

@@ -10,6 +10,7 @@ mod ball_impact;
 mod ball_zones;
 mod bed;
 mod boulder;
+mod bundled;
 mod check;
 mod chute;
 mod cliff;
@@ -25,6 +26,7 @@ mod cylinder;
 mod cylinder_of_grains;
 mod cylinder_terrain;
 mod error;
+mod family;
 mod friction_keys;
 mod friction_law;
 mod grain_intervals;
@@ -52,6 +54,7 @@ pub use bagnold::{BagnoldGrid, BagnoldScene, FrictionLaw, RheologyKeys, SolverKe
 pub use ball_impact::{BallImpactScene, BallModel};
 pub use bed::Pace;
 pub use boulder::BoulderScene;
+pub use bundled::{BUNDLED, bundled};
 pub use chute::ChuteScene;
 pub use cliff::{CliffCrackKeys, CliffModel, CliffScene, CliffShapeKeys};
 pub use cliff_runout::CliffRunoutKeys;
@@ -69,6 +72,7 @@ pub use cylinder::{CylinderGrid, CylinderScene};
 pub use cylinder_of_grains::{GrainCylinderGrid, GrainCylinderKeys, GrainCylinderScene};
 pub use cylinder_terrain::ReliefKeys;
 pub use error::SceneError;
+pub use family::SceneBody;
 pub use friction_law::LawVisitor;
 pub use grain_intervals::GrainIntervals;
 pub use grains::GrainsScene;
@@ -91,126 +95,11 @@ pub use silo::SiloScene;
 pub use tensile::{ClampKind, TensileScene};
 pub use tumbling_box::{Attitude, BedKeys, LanderKeys, TumblingBoxScene};
 
-use crate::rheology_file::{self, FrictionOf};
+use crate::rheology_file;
+use bundled::base_of;
+use family::Family;
 use serde_json::{Value, json};
 use std::path::{Path, PathBuf};
-
-/// The names and texts of the bundled scenes.
-pub const BUNDLED: [(&str, &str); 25] = [
-    ("incline", include_str!("../scenes/incline.toml")),
-    (
-        "incline-moderate",
-        include_str!("../scenes/incline-moderate.toml"),
-    ),
-    (
-        "incline-gravel",
-        include_str!("../scenes/incline-gravel.toml"),
-    ),
-    (
-        "incline-glass",
-        include_str!("../scenes/incline-glass.toml"),
-    ),
-    ("bagnold", include_str!("../scenes/bagnold.toml")),
-    ("plane-shear", include_str!("../scenes/plane-shear.toml")),
-    (
-        "vertical-chute",
-        include_str!("../scenes/vertical-chute.toml"),
-    ),
-    ("two-spheres", include_str!("../scenes/two-spheres.toml")),
-    (
-        "sphere-on-plane",
-        include_str!("../scenes/sphere-on-plane.toml"),
-    ),
-    ("chute", include_str!("../scenes/chute.toml")),
-    ("settle", include_str!("../scenes/settle.toml")),
-    ("grains", include_str!("../scenes/grains.toml")),
-    ("tensile-test", include_str!("../scenes/tensile-test.toml")),
-    ("boulder-drop", include_str!("../scenes/boulder-drop.toml")),
-    (
-        "angle-of-repose",
-        include_str!("../scenes/angle-of-repose.toml"),
-    ),
-    (
-        "cylinder-of-grains",
-        include_str!("../scenes/cylinder-of-grains.toml"),
-    ),
-    ("silo", include_str!("../scenes/silo.toml")),
-    ("ball-impact", include_str!("../scenes/ball-impact.toml")),
-    ("tumbling-box", include_str!("../scenes/tumbling-box.toml")),
-    (
-        "column-collapse",
-        include_str!("../scenes/column-collapse.toml"),
-    ),
-    (
-        "cylinder-collapse",
-        include_str!("../scenes/cylinder-collapse.toml"),
-    ),
-    ("open-chute", include_str!("../scenes/open-chute.toml")),
-    ("cliff", include_str!("../scenes/cliff.toml")),
-    ("cliff-aswan", include_str!("../scenes/cliff-aswan.toml")),
-    ("cliff-plain", include_str!("../scenes/cliff-plain.toml")),
-];
-
-/// The text of a bundled scene.
-pub fn bundled(name: &str) -> Option<&'static str> {
-    BUNDLED
-        .iter()
-        .find(|(n, _)| *n == name)
-        .map(|(_, text)| *text)
-}
-
-/// The part of a scene that its kind decides.
-#[derive(Clone, Debug, PartialEq)]
-pub enum SceneBody {
-    /// Grains on a rough inclined plane.
-    Incline(Box<InclineScene>),
-    /// The μ(I) continuum on an incline.
-    Bagnold(Box<BagnoldScene>),
-    /// The continuum between plates or walls, beside its exact solution.
-    Sheared(ShearedScene),
-    /// One impact of two spheres, or of a sphere on a plane.
-    Impact(Box<ImpactScene>),
-    /// Grains on a rough chute, from a start file.
-    Chute(Box<ChuteScene>),
-    /// Grains that settle in a box.
-    Settle(Box<SettleScene>),
-    /// Grains with walls, bonds, gravity and a preparation.
-    Grains(Box<Kind>),
-    /// A column of material that collapses.
-    Collapse(Box<CollapseScene>),
-    /// A cylinder of material that collapses, in space.
-    Cylinder(Box<CylinderScene>),
-    /// A layer that enters a chute at one end and leaves it at the other.
-    OpenChute(Box<OpenChuteScene>),
-}
-
-impl SceneBody {
-    /// Every key as it was read, so that `31` and `31.0` are the same scene.
-    fn to_table(&self) -> toml::Table {
-        match self {
-            SceneBody::Incline(scene) => toml::Table::try_from(scene),
-            SceneBody::Bagnold(scene) => toml::Table::try_from(scene),
-            SceneBody::Sheared(scene) => scene.to_table(),
-            SceneBody::Impact(scene) => toml::Table::try_from(scene),
-            SceneBody::Chute(scene) => toml::Table::try_from(scene),
-            SceneBody::Settle(scene) => toml::Table::try_from(scene),
-            SceneBody::Grains(kind) => kind.to_table(),
-            SceneBody::Collapse(scene) => toml::Table::try_from(scene),
-            SceneBody::Cylinder(scene) => toml::Table::try_from(scene),
-            SceneBody::OpenChute(scene) => toml::Table::try_from(scene),
-        }
-        .unwrap_or_default()
-    }
-
-    /// The start file, where the scene names one.
-    pub fn start_file(&self) -> Option<&str> {
-        match self {
-            SceneBody::Chute(scene) => scene.start.as_deref(),
-            SceneBody::Settle(scene) => scene.start.as_deref(),
-            _ => None,
-        }
-    }
-}
 
 /// A checked scene.
 #[derive(Clone, Debug)]
@@ -274,49 +163,21 @@ impl Scene {
         let name = kind_of(&mut own, origin)?;
         let mut base = layers::parse(base_of(&name), &name)?;
         base.remove("scene");
-        let schema = body_schema(&name);
+        let schema = SceneBody::schema(&name);
 
-        let choices = alternatives(&name);
-        // A rheology file is replaced by its numbers before layers are laid over each other, so
-        // only the stiffness keys have defaults to drop.
-        let kind = family(&name);
-        let drops: &[&[&str]] = match kind {
-            Family::Bagnold | Family::Sheared | Family::Cylinder => &[],
-            Family::Collapse => &law::CHOICES,
-            Family::Incline => &INCLINE_CHOICES[..1],
-            Family::OpenChute => &CHUTE_CHOICES[..1],
-            _ => choices,
-        };
-        let impact = matches!(kind, Family::Impact);
-        let lawful = matches!(
-            kind,
-            Family::Impact | Family::Chute | Family::Settle | Family::Grains | Family::Collapse
-        );
+        let family = Family::of(&name);
+        let choices = family.alternatives();
+        let drops = family.defaults_to_drop();
+        let impact = family == Family::Impact;
+        let lawful = family.has_contact_law();
         check::check(&own, &schema, origin)?;
         layers::check_choices(&own, choices, origin)?;
         if let Some(folder) = folder {
-            rheology_file::anchor(&mut own, folder);
-            if matches!(kind, Family::Chute | Family::Settle) {
-                layers::anchor_path(&mut own, "start", folder);
-            }
-            if matches!(kind, Family::Grains) {
-                kinds::anchor(&mut own, folder);
-            }
-            if matches!(kind, Family::Collapse) {
-                kinds::anchor_packing(&mut own, "grains.packing", folder);
-            }
-            if matches!(kind, Family::Collapse | Family::Cylinder) {
-                layers::anchor_path(&mut own, "terrain.heights", folder);
-                layers::anchor_path(&mut own, "terrain.mesh", folder);
-            }
+            family.anchor(&mut own, folder);
         }
         // What was written, before a file's numbers take their places.
         let mut written = own.clone();
-        // A flow down a slope goes by |τ|/σ_zz, which its weight gives.
-        let friction = match kind {
-            Family::Incline => FrictionOf::NormalStress,
-            _ => FrictionOf::Pressure,
-        };
+        let friction = family.friction();
         rheology_file::resolve(&mut base, friction)?;
         friction_keys::forget_defaults(&mut written, &base);
         let mut inputs = Vec::new();
@@ -347,16 +208,8 @@ impl Scene {
             law_layers::check_read(&table, &set, (impact, true), option)?;
             law_layers::drop_unread(&mut table, impact);
         }
-        let of_incline = matches!(kind, Family::Incline) && table.contains_key("rheology");
-        let of_continuum = matches!(
-            kind,
-            Family::Bagnold
-                | Family::Sheared
-                | Family::Collapse
-                | Family::Cylinder
-                | Family::OpenChute
-        );
-        if of_incline || of_continuum {
+        let of_incline = family == Family::Incline && table.contains_key("rheology");
+        if of_incline || family.has_continuum() {
             // A bundled scene has the numbers of all laws, as defaults.
             if folder.is_some() && !friction_keys::chooses(&set) {
                 friction_keys::check_read(&table, &written, origin)?;
@@ -368,30 +221,14 @@ impl Scene {
         check::check(&table, &schema, origin)?;
         check::require(&table, &schema, origin)?;
 
-        let body = body(&name, &table).map_err(|message| SceneError::Unreadable {
+        let body = SceneBody::read(&name, table).map_err(|error| SceneError::Unreadable {
             file: origin.to_owned(),
-            message,
+            message: error.message().to_owned(),
         })?;
         let mut resolved = toml::Table::new();
         resolved.insert("scene".into(), toml::Value::String(name.clone()));
         resolved.extend(body.to_table());
-        inputs.extend(body.start_file().map(PathBuf::from));
-        match &body {
-            SceneBody::Grains(_) => inputs.extend(kinds::inputs(&resolved)),
-            SceneBody::Collapse(scene) => {
-                let packing = scene.grains.packing.as_deref();
-                inputs.extend(packing.filter(|s| s.ends_with(".h5")).map(PathBuf::from));
-            }
-            _ => {}
-        }
-        let terrain = match &body {
-            SceneBody::Collapse(body) => {
-                body.terrain.as_ref().and_then(|keys| keys.source().file())
-            }
-            SceneBody::Cylinder(body) => body.terrain.as_ref().and_then(ReliefKeys::file),
-            _ => None,
-        };
-        inputs.extend(terrain.map(|(_, file)| PathBuf::from(file)));
+        inputs.extend(body.inputs(&resolved));
         let scene = Scene {
             name,
             body,
@@ -399,7 +236,7 @@ impl Scene {
             origin: origin.to_owned(),
             inputs,
         };
-        scene.check_together(origin)?;
+        scene.body.check_together(origin)?;
         Ok(scene)
     }
 
@@ -425,22 +262,6 @@ impl Scene {
     pub fn to_toml(&self) -> String {
         let body = toml::to_string_pretty(&self.resolved).unwrap_or_default();
         format!("# Resolved scene: every key with the value that was used. SI units.\n{body}")
-    }
-
-    /// Limits that involve more than one key.
-    fn check_together(&self, origin: &str) -> Result<(), SceneError> {
-        match &self.body {
-            SceneBody::Incline(scene) => scene.check_together(origin),
-            SceneBody::Bagnold(scene) => scene.check_together(origin),
-            SceneBody::Sheared(scene) => scene.check_together(origin),
-            SceneBody::Impact(scene) => scene.check_together(origin),
-            SceneBody::Chute(scene) => scene.check_together(origin),
-            SceneBody::Settle(scene) => scene.check_together(origin),
-            SceneBody::Grains(kind) => kind.check_together(origin),
-            SceneBody::Collapse(scene) => scene.check_together(origin),
-            SceneBody::Cylinder(scene) => scene.check_together(origin),
-            SceneBody::OpenChute(scene) => scene.check_together(origin),
-        }
     }
 }
 
@@ -476,149 +297,12 @@ fn kind_of(table: &mut toml::Table, origin: &str) -> Result<String, SceneError> 
     }
 }
 
-fn body(name: &str, table: &toml::Table) -> Result<SceneBody, String> {
-    let table = table.clone();
-    Ok(match family(name) {
-        Family::Incline => SceneBody::Incline(table.try_into().map_err(plain)?),
-        Family::Bagnold => SceneBody::Bagnold(table.try_into().map_err(plain)?),
-        Family::Sheared => SceneBody::Sheared(ShearedScene::read(name, table).map_err(plain)?),
-        Family::Impact => SceneBody::Impact(table.try_into().map_err(plain)?),
-        Family::Chute => SceneBody::Chute(table.try_into().map_err(plain)?),
-        Family::Settle => SceneBody::Settle(table.try_into().map_err(plain)?),
-        Family::Grains => match Kind::read(name, table) {
-            Some(kind) => SceneBody::Grains(Box::new(kind.map_err(plain)?)),
-            None => return Err(format!("no scene is called `{name}`")),
-        },
-        Family::Collapse => SceneBody::Collapse(table.try_into().map_err(plain)?),
-        Family::Cylinder => SceneBody::Cylinder(table.try_into().map_err(plain)?),
-        Family::OpenChute => SceneBody::OpenChute(table.try_into().map_err(plain)?),
-    })
-}
-
-fn plain(error: toml::de::Error) -> String {
-    error.message().to_owned()
-}
-
 /// A sphere lighter than this (kg) is a slip of the keyboard, and its mass soon rounds to zero.
 const LEAST_MASS: f64 = 1e-100;
 
-enum Family {
-    Incline,
-    Bagnold,
-    Sheared,
-    Impact,
-    Chute,
-    Settle,
-    Grains,
-    Collapse,
-    Cylinder,
-    OpenChute,
-}
-
-/// What a scene of this kind builds on. A `grains` scene stands for itself: walls and grains of the
-/// bundled example are nobody's defaults.
-fn base_of(name: &str) -> &'static str {
-    match name {
-        "grains" => "",
-        _ => bundled(name).unwrap_or_default(),
-    }
-}
-
-fn family(name: &str) -> Family {
-    match name {
-        "bagnold" => Family::Bagnold,
-        "plane-shear" | "vertical-chute" => Family::Sheared,
-        "two-spheres" | "sphere-on-plane" => Family::Impact,
-        "chute" => Family::Chute,
-        "settle" => Family::Settle,
-        _ if Kind::NAMES.contains(&name) => Family::Grains,
-        "column-collapse" | "cliff-plain" => Family::Collapse,
-        "cylinder-collapse" => Family::Cylinder,
-        "open-chute" => Family::OpenChute,
-        _ => Family::Incline,
-    }
-}
-
-/// Keys of which exactly one may be given: naming one drops the others' defaults.
-fn alternatives(name: &str) -> &'static [&'static [&'static str]] {
-    match family(name) {
-        Family::Incline => &INCLINE_CHOICES,
-        Family::Bagnold | Family::Sheared | Family::Cylinder => rheology_file::ALTERNATIVES,
-        Family::Collapse => &COLLAPSE_CHOICES,
-        Family::OpenChute => &CHUTE_CHOICES,
-        Family::Impact | Family::Grains => &law::CHOICES,
-        Family::Chute | Family::Settle => &BED_CHOICES,
-    }
-}
-
-/// One choice and a rheology file or numbers.
-const fn beside_rheology(
-    first: &'static [&'static str],
-) -> [&'static [&'static str]; 1 + rheology_file::ALTERNATIVES.len()] {
-    let mut choices = [first; 1 + rheology_file::ALTERNATIVES.len()];
-    let mut k = 0;
-    while k < rheology_file::ALTERNATIVES.len() {
-        choices[k + 1] = rheology_file::ALTERNATIVES[k];
-        k += 1;
-    }
-    choices
-}
-
-/// Alternatives of inclines: the stiffness, and a rheology file or numbers.
-const INCLINE_CHOICES: [&[&str]; 1 + rheology_file::ALTERNATIVES.len()] = beside_rheology(&[
-    "contact.stiffness_scaled",
-    "contact.stiffness",
-    "contact.stiffness_from_speed",
-]);
-
-/// Alternatives of fed chutes: what enters, and a rheology file or numbers.
-const CHUTE_CHOICES: [&[&str]; 1 + rheology_file::ALTERNATIVES.len()] =
-    beside_rheology(open_chute::INFLOWS);
-
-/// Alternatives of the scenes of a bed: its length, and those of the law.
-const BED_CHOICES: [&[&str]; 4] = [
-    bed::LENGTH,
-    law::CHOICES[0],
-    law::CHOICES[1],
-    law::CHOICES[2],
-];
-
-/// Alternatives of the collapse: those of its continuum and of its grains.
-const COLLAPSE_CHOICES: [&[&str]; rheology_file::ALTERNATIVES.len() + law::CHOICES.len()] = {
-    let mut all: [&[&str]; rheology_file::ALTERNATIVES.len() + law::CHOICES.len()] =
-        [&[]; rheology_file::ALTERNATIVES.len() + law::CHOICES.len()];
-    let (first, mut k) = (rheology_file::ALTERNATIVES.len(), 0);
-    while k < all.len() {
-        all[k] = if k < first {
-            rheology_file::ALTERNATIVES[k]
-        } else {
-            law::CHOICES[k - first]
-        };
-        k += 1;
-    }
-    all
-};
-
-/// The JSON Schema of one kind, without the key `scene`.
-fn body_schema(name: &str) -> Value {
-    let schema = match family(name) {
-        Family::Incline => schemars::schema_for!(InclineScene),
-        Family::Bagnold => schemars::schema_for!(BagnoldScene),
-        Family::Sheared => return ShearedScene::schema(name),
-        Family::Impact => schemars::schema_for!(ImpactScene),
-        Family::Chute => schemars::schema_for!(ChuteScene),
-        Family::Settle => schemars::schema_for!(SettleScene),
-        Family::Grains => return Kind::schema(name).unwrap_or_default(),
-        Family::Collapse => schemars::schema_for!(CollapseScene),
-        Family::Cylinder => schemars::schema_for!(CylinderScene),
-        Family::OpenChute => schemars::schema_for!(OpenChuteScene),
-    };
-    schema.to_value()
-}
-
 /// Checks a table of keys of the continuum scene as a scene file would be.
 pub fn check_continuum_keys(table: &toml::Table, origin: &str) -> Result<(), SceneError> {
-    check::check(table, &body_schema("bagnold"), origin)
+    check::check(table, &SceneBody::schema("bagnold"), origin)
 }
 
 /// The JSON Schema of scene files, for editors.
@@ -628,7 +312,7 @@ pub fn json_schema() -> Value {
     let mut kinds = Vec::new();
     let mut definitions = serde_json::Map::new();
     for (name, _) in BUNDLED {
-        let mut schema = body_schema(name);
+        let mut schema = SceneBody::schema(name);
         if let Some(object) = schema.as_object_mut() {
             if let Some(Value::Object(inner)) = object.remove("$defs") {
                 for (key, mut definition) in inner {

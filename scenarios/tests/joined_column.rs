@@ -3,7 +3,7 @@
 use crate::command::{
     MOVING_EDGE, SMALL_JOINED_COLUMN, colluvium, hash, succeed, summary, table, value,
 };
-use colluvium_coupling::overlap::bowl::Reason;
+use colluvium_coupling::overlap::Reason;
 use std::path::Path;
 
 fn arguments<'a>(out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
@@ -196,6 +196,16 @@ fn bad_joined_columns_are_refused_by_key() {
             "above zones.rest_speed_scaled",
         ),
         (&["zones.budget=100"], "zones.budget", "zones.moving"),
+        (
+            &["zones.fastest_inertial=0.1"],
+            "zones.fastest_inertial",
+            "zones.moving",
+        ),
+        (
+            &["zones.moving=true", "zones.loosest_scaled=1.5"],
+            "zones.loosest_scaled",
+            "1",
+        ),
         (
             &["zones.edge_scaled=1", "zones.tolerance=0.05"],
             "zones.edge_scaled",

@@ -4,9 +4,7 @@
 //! `cargo run --release -p colluvium-benchmarks --bin columns -- --tables FOLDER` on 256, 256 and 384 cells along x for
 //! a = 0.5, 1.42 and 6.26; `--aspect 0.5 --cells 128` for one of them, `--threads 2` on two threads. Prints Markdown.
 //!
-//! The peer is Basilisk C 25-02-26 (own runs, serial, one core of an EPYC under load, ±30 %), which moves air of a
-//! thousandth of the density, too. A film of it under the front carries the front farther, so that its figures are no truth.
-//! FOLDER holds its profiles as `c<a>_N<cells>_h.csv`, with columns t, x and h in units of the column's height
+//! FOLDER holds the profiles of the peer ([`colluvium_benchmarks::columns`]) as `c<a>_N<cells>_h.csv`, with columns t, x and h in units of the column's height
 //! H and √(H/g); the profiles are compared as ∫|h − h_peer| dx over the column's area.
 
 use std::error::Error;
@@ -15,10 +13,10 @@ use std::path::{Path, PathBuf};
 use std::time::Instant;
 
 use clap::Parser;
+use colluvium_benchmarks::columns::{COLUMNS, Column, Profile};
 use colluvium_benchmarks::peers::machine::{begin_peak_of_memory, memory, processor_time};
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
 use colluvium_continuum::free_surface::{Spent, SurfaceOptions, SurfaceStep};
-use colluvium_continuum::rheology::MuI;
 
 type Outcome<T> = Result<T, Box<dyn Error>>;
 
@@ -44,52 +42,6 @@ struct Arguments {
     tables: Option<PathBuf>,
 }
 
-/// A column of the field's comparisons, μ_s 0.32, Δμ 0.28, I_0 0.4.
-struct Column {
-    aspect: f64,
-    /// H over the diameter of grains.
-    grains: f64,
-    length: f64,
-    cells: usize,
-    /// (x_f − L)/L of the peer at t = 1 … 6 √(H/g), where h = H/100, by its cells along x.
-    peer: &'static [(usize, [f64; 6])],
-}
-
-const COLUMNS: [Column; 3] = [
-    Column {
-        aspect: 0.5,
-        grains: 30.0,
-        length: 5.0,
-        cells: 256,
-        peer: &[
-            (128, [0.200, 0.586, 0.820, 0.936, 0.995, 1.020]),
-            (256, [0.212, 0.623, 0.906, 1.060, 1.136, 1.158]),
-            (512, [0.212, 0.646, 0.921, 1.064, 1.131, 1.157]),
-        ],
-    },
-    Column {
-        aspect: 1.42,
-        grains: 65.0,
-        length: 5.0,
-        cells: 256,
-        peer: &[
-            (128, [0.640, 1.844, 2.713, 3.154, 3.393, 3.566]),
-            (256, [0.650, 1.971, 3.000, 3.545, 3.772, 3.834]),
-            (512, [0.640, 1.976, 3.003, 3.660, 3.923, 4.014]),
-        ],
-    },
-    Column {
-        aspect: 6.26,
-        grains: 134.0,
-        length: 3.75,
-        cells: 384,
-        peer: &[
-            (192, [2.419, 7.320, 11.587, 13.783, 14.111, 13.519]),
-            (384, [2.538, 7.260, 11.367, 13.911, 14.927, 14.902]),
-        ],
-    },
-];
-
 /// The front is where the heap is this high, over H.
 const FRONT: f64 = 0.01;
 /// Time between profiles in √(H/g).
@@ -102,49 +54,6 @@ const WATCHED: f64 = 5.0;
 const CORE: f64 = 0.25;
 /// in columns of a smaller aspect ratio than this.
 const ALL_FLOWS: f64 = 1.0;
-
-/// Heights of a heap at even places.
-#[derive(Default)]
-struct Profile {
-    x: Vec<f64>,
-    h: Vec<f64>,
-}
-
-impl Profile {
-    fn of(collapse: &Collapse) -> Self {
-        let (x, h) = collapse.profile();
-        Self { x, h }
-    }
-
-    fn spacing(&self) -> f64 {
-        self.x[1] - self.x[0]
-    }
-
-    /// Mean height from `low` to `high`, each height being that of its interval.
-    fn mean(&self, low: f64, high: f64) -> f64 {
-        let half = 0.5 * self.spacing();
-        let parts = self.x.iter().zip(&self.h).map(|(x, h)| {
-            let overlap = (high.min(x + half) - low.max(x - half)).max(0.0);
-            overlap * h
-        });
-        parts.sum::<f64>() / (high - low)
-    }
-
-    /// ∫|h − h_other| dx on the coarser of both.
-    fn apart(&self, other: &Self) -> f64 {
-        let (coarse, fine) = if self.spacing() > other.spacing() {
-            (self, other)
-        } else {
-            (other, self)
-        };
-        let spacing = coarse.spacing();
-        let misses = coarse.x.iter().zip(&coarse.h).map(|(x, h)| {
-            let mean = fine.mean(x - 0.5 * spacing, x + 0.5 * spacing);
-            (h - mean).abs() * spacing
-        });
-        misses.sum()
-    }
-}
 
 /// The profiles of a peer by time, under a head line.
 fn read_profiles(path: &Path) -> Outcome<Vec<(f64, Profile)>> {
@@ -445,15 +354,7 @@ fn columns(arguments: &Arguments) -> Outcome<()> {
             continue;
         }
         let cells = arguments.cells.unwrap_or(column.cells);
-        let case = CollapseCase {
-            aspect: column.aspect,
-            height: 1.0,
-            gravity: 1.0,
-            rheology: MuI::new(0.32, 0.60, 0.4, 1.0 / column.grains, 1.0, 1.0),
-            cells,
-            length_scaled: column.length,
-            overhang_degrees: 0.0,
-        };
+        let case = column.case(cells);
         let run = Run::of(&case, &options)?;
         print_cost(column, cells, &run);
         print_fronts(column, &case, &run, arguments.tables.as_deref())?;

@@ -4,17 +4,12 @@
 //! factors: nothing is summed across subtrees, so that the bits do not depend on what runs beside what. Wide supernodes, the
 //! strips between large halves, are worked on in blocks of columns.
 
+mod division;
+mod layout;
+
 use std::ops::Range;
 
-use faer::dyn_stack::{MemBuffer, MemStack};
-use faer::linalg::cholesky::ldlt::factor::{
-    LdltRegularization, cholesky_in_place, cholesky_in_place_scratch,
-};
 use faer::linalg::matmul::matmul;
-use faer::linalg::triangular_solve::solve_unit_lower_triangular_in_place;
-use faer::perm::PermRef;
-use faer::prelude::{Reborrow, ReborrowMut};
-use faer::sparse::SymbolicSparseColMatRef;
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 use faer::{Accum, MatMut, MatRef, Par};
 
@@ -22,6 +17,9 @@ use super::panels::Panels;
 use super::subtrees::Subtree;
 use crate::error::Error;
 use crate::threads;
+use division::{Strand, divide, shared};
+pub(super) use layout::Layout;
+use layout::Update;
 
 /// Columns that are worked on at once.
 const BLOCK: usize = 48;
@@ -30,113 +28,12 @@ const WORTH_SHARING: usize = 400_000;
 /// Pivots smaller than this, or of the wrong sign by round-off, are replaced by it.
 pub(super) const SMALLEST_PIVOT: f64 = 1e-14;
 
-/// What an earlier supernode contributes to a later one.
-#[derive(Debug, Clone, Copy)]
-struct Update {
-    from: u32,
-    /// Rows of it that are columns of the later one: from this one on,
-    first: u32,
-    /// and so many.
-    count: u32,
-}
-
-/// What belongs to each supernode of a pattern.
-pub(super) struct Layout {
-    /// What each supernode takes, one after the other, and where that ends.
-    updates: Vec<Update>,
-    ends_of_updates: Vec<u32>,
-    /// Coefficients of the lower triangle of the matrix, by supernodes: which one, and where it goes.
-    entries: Vec<[u32; 2]>,
-    ends_of_entries: Vec<u32>,
-    /// Signs of the pivots.
-    signs: Vec<i8>,
-}
-
 /// Memory of a subtree.
 pub(super) struct Bench {
     halves: Option<Box<[Bench; 2]>>,
     /// Where a row stands in the present supernode.
     places: Vec<u32>,
     strands: [Strand; 2],
-}
-
-/// Memory of the work on a block of columns.
-struct Strand {
-    product: Vec<f64>,
-    scaled: Vec<f64>,
-    scratch: MemBuffer,
-}
-
-impl Layout {
-    /// The layout for the lower triangle of a pattern in an order.
-    pub(super) fn new(
-        pattern: SymbolicSparseColMatRef<'_, usize>,
-        order: PermRef<'_, usize>,
-        symbolic: &SymbolicSupernodalCholesky<usize>,
-        sign: impl Fn(usize) -> i8,
-    ) -> Self {
-        let (forward, back) = order.arrays();
-        let (begins, ends) = (symbolic.supernode_begin(), symbolic.supernode_end());
-        let count = symbolic.n_supernodes();
-        let mut owners = vec![0_u32; symbolic.nrows()];
-        for (s, (&begin, &end)) in begins.iter().zip(ends).enumerate() {
-            owners[begin..end].fill(s as u32);
-        }
-        let (updates, ends_of_updates) = all_updates(symbolic, &owners);
-        // Coefficients by the supernode of their column.
-        let lower = || {
-            (0..pattern.ncols()).flat_map(|column| {
-                let slots = pattern.col_range(column);
-                let rows = &pattern.row_idx()[slots.clone()];
-                let below = slots.zip(rows).filter(move |(_, row)| **row >= column);
-                below.map(move |(slot, &row)| {
-                    let [a, b] = [back[row], back[column]];
-                    (slot, a.max(b), a.min(b))
-                })
-            })
-        };
-        let mut next = vec![0_u32; count + 1];
-        for (_, _, column) in lower() {
-            next[owners[column] as usize + 1] += 1;
-        }
-        for s in 0..count {
-            next[s + 1] += next[s];
-        }
-        let total = next[count] as usize;
-        let mut entries = vec![[0_u32; 2]; total];
-        let mut rows = vec![0_u32; total];
-        for (slot, row, column) in lower() {
-            let place = &mut next[owners[column] as usize];
-            entries[*place as usize] = [slot as u32, column as u32];
-            rows[*place as usize] = row as u32;
-            *place += 1;
-        }
-        next.truncate(count);
-        let ends_of_entries = next;
-        let mut places = vec![0_usize; symbolic.nrows()];
-        let mut first = 0;
-        for s in 0..count {
-            let [begin, end] = [begins[s], ends[s]];
-            let below = symbolic.supernode(s).pattern();
-            let height = end - begin + below.len();
-            for (place, row) in (begin..end).chain(below.iter().copied()).enumerate() {
-                places[row] = place;
-            }
-            let last = ends_of_entries[s] as usize;
-            for (entry, &row) in entries[first..last].iter_mut().zip(&rows[first..last]) {
-                let column = entry[1] as usize - begin;
-                entry[1] = (column * height + places[row as usize]) as u32;
-            }
-            first = last;
-        }
-        Self {
-            updates,
-            ends_of_updates,
-            entries,
-            ends_of_entries,
-            signs: forward.iter().map(|&unknown| sign(unknown)).collect(),
-        }
-    }
 }
 
 /// A factorisation: the pattern and the coefficients of the matrix.
@@ -323,163 +220,8 @@ impl Target<'_> {
     }
 }
 
-/// The factors of a supernode that has taken what earlier ones contribute: D on the diagonal, L below.
-fn divide(
-    own: &mut [f64],
-    height: usize,
-    signs: &[i8],
-    strands: &mut [Strand; 2],
-) -> Result<(), Error> {
-    let width = signs.len();
-    if width == 1 {
-        let sign = f64::from(signs[0]);
-        if !own[0].is_finite() {
-            return Err(Error::LinearSolver("a pivot is not finite".into()));
-        }
-        if own[0] * sign <= SMALLEST_PIVOT {
-            own[0] = sign * SMALLEST_PIVOT;
-        }
-        let by = 1.0 / own[0];
-        own[1..].iter_mut().for_each(|l| *l *= by);
-        return Ok(());
-    }
-    for from in (0..width).step_by(BLOCK) {
-        let to = width.min(from + BLOCK);
-        let (block, later) = own[from * height..].split_at_mut((to - from) * height);
-        divide_block(block, height, from, &signs[from..to], &mut strands[0])?;
-        let block = &*block;
-        let blocks = later.len().div_ceil(BLOCK * height);
-        let half = |later: &mut [f64], first: usize, strand: &mut Strand| {
-            for (n, columns) in later.chunks_mut(BLOCK * height).enumerate() {
-                take_away(block, columns, height, [from, first + n * BLOCK], strand);
-            }
-        };
-        let [one, other] = &mut *strands;
-        let middle = shared(blocks) * BLOCK * height;
-        if blocks < 2 || later.len() * BLOCK < WORTH_SHARING {
-            half(later, to, one);
-        } else {
-            let (left, right) = later.split_at_mut(middle);
-            threads::join(
-                true,
-                || half(left, to, one),
-                || half(right, to + middle / height, other),
-            );
-        }
-    }
-    Ok(())
-}
-
-/// Factors of a block of columns, the first of which is number `from`.
-fn divide_block(
-    block: &mut [f64],
-    height: usize,
-    from: usize,
-    signs: &[i8],
-    strand: &mut Strand,
-) -> Result<(), Error> {
-    let width = signs.len();
-    let block = MatMut::from_column_major_slice_mut(block, height, width);
-    let (_, block) = block.split_at_row_mut(from);
-    let (mut top, mut below) = block.split_at_row_mut(width);
-    cholesky_in_place(
-        top.rb_mut(),
-        LdltRegularization {
-            dynamic_regularization_signs: Some(signs),
-            dynamic_regularization_delta: SMALLEST_PIVOT,
-            dynamic_regularization_epsilon: SMALLEST_PIVOT,
-        },
-        Par::Seq,
-        MemStack::new(&mut strand.scratch),
-        Default::default(),
-    )
-    .map_err(|e| Error::LinearSolver(format!("{e:?}")))?;
-    solve_unit_lower_triangular_in_place(top.rb(), below.rb_mut().transpose_mut(), Par::Seq);
-    for j in 0..width {
-        let by = 1.0 / top[(j, j)];
-        below.rb_mut().col_mut(j).iter_mut().for_each(|l| *l *= by);
-    }
-    Ok(())
-}
-
-/// Takes what a block of a supernode contributes away from a later one; numbers of their first columns.
-fn take_away(
-    block: &[f64],
-    columns: &mut [f64],
-    height: usize,
-    [from, first]: [usize; 2],
-    strand: &mut Strand,
-) {
-    let width = block.len() / height;
-    let count = columns.len() / height;
-    let scaled = &mut strand.scaled[..count * width];
-    for (n, scaled) in scaled.chunks_exact_mut(width).enumerate() {
-        for (k, scaled) in scaled.iter_mut().enumerate() {
-            *scaled = block[k * height + from + k] * block[k * height + first + n];
-        }
-    }
-    let rows = height - first;
-    matmul(
-        MatMut::from_column_major_slice_with_stride_mut(&mut columns[first..], rows, count, height),
-        Accum::Add,
-        MatRef::from_column_major_slice_with_stride(&block[first..], rows, width, height),
-        MatRef::from_column_major_slice(&*scaled, width, count),
-        -1.0,
-        Par::Seq,
-    );
-}
-
-/// How many of the blocks of a lower triangle are half the work: later columns are shorter.
-fn shared(blocks: usize) -> usize {
-    (blocks * 3 / 10).max(1)
-}
-
 fn columns(symbolic: &SymbolicSupernodalCholesky<usize>, s: usize) -> Range<usize> {
     symbolic.supernode_begin()[s]..symbolic.supernode_end()[s]
-}
-
-/// What each supernode takes from earlier ones, in their order.
-fn all_updates(
-    symbolic: &SymbolicSupernodalCholesky<usize>,
-    owners: &[u32],
-) -> (Vec<Update>, Vec<u32>) {
-    let count = symbolic.n_supernodes();
-    let runs = |s: usize| {
-        let pattern = symbolic.supernode(s).pattern();
-        let mut first = 0;
-        std::iter::from_fn(move || {
-            let owner = owners[*pattern.get(first)?];
-            let run = pattern[first..].iter();
-            let length = run.take_while(|row| owners[**row] == owner).count();
-            first += length;
-            Some((owner as usize, first - length, length))
-        })
-    };
-    let mut next = vec![0_u32; count + 1];
-    for s in 0..count {
-        runs(s).for_each(|(owner, ..)| next[owner + 1] += 1);
-    }
-    for s in 0..count {
-        next[s + 1] += next[s];
-    }
-    let none = Update {
-        from: 0,
-        first: 0,
-        count: 0,
-    };
-    let mut updates = vec![none; next[count] as usize];
-    for s in 0..count {
-        for (owner, first, length) in runs(s) {
-            updates[next[owner] as usize] = Update {
-                from: s as u32,
-                first: first as u32,
-                count: length as u32,
-            };
-            next[owner] += 1;
-        }
-    }
-    next.truncate(count);
-    (updates, next)
 }
 
 impl Bench {
@@ -512,15 +254,7 @@ impl Bench {
         Self {
             halves,
             places: vec![0; symbolic.nrows()],
-            strands: [(); 2].map(|()| Strand {
-                product: vec![0.0; product],
-                scaled: vec![0.0; scaled],
-                scratch: MemBuffer::new(cholesky_in_place_scratch::<f64>(
-                    BLOCK,
-                    Par::Seq,
-                    Default::default(),
-                )),
-            }),
+            strands: [(); 2].map(|()| Strand::new(product, scaled)),
         }
     }
 }

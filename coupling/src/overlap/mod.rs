@@ -25,6 +25,7 @@
 mod angular;
 mod averages;
 pub mod bowl;
+mod dense_limits;
 mod edge;
 mod exchange;
 mod far_side;
@@ -43,6 +44,7 @@ mod strip;
 
 pub use angular::AngularBook;
 pub use averages::{Averages, FaceStress, Node};
+pub use dense_limits::{DenseLimits, Reason};
 pub use edge::{FlatEdge, ZoneEdge};
 pub use far_side::FarSide;
 pub use ledger::Ledger;

@@ -2,9 +2,9 @@
 
 use colluvium_continuum::free_surface::SurfaceOptions;
 use colluvium_continuum::rheology::MuI;
-use colluvium_coupling::overlap::bowl::{Bowl, BowlSpec, Growth, Reason};
+use colluvium_coupling::overlap::bowl::{Bowl, BowlSpec, Growth};
 use colluvium_coupling::overlap::material_edge::Travel;
-use colluvium_coupling::overlap::{OverlapSettings, Scales};
+use colluvium_coupling::overlap::{DenseLimits, OverlapSettings, Reason, Scales};
 use colluvium_dem::preparation::*;
 use colluvium_dem::*;
 use nalgebra::Vector3;
@@ -111,6 +111,7 @@ pub(super) const TRAVEL: Travel = Travel {
     hold: 1.0,
     budget: f64::INFINITY,
     fewest: 20.0,
+    dense: DenseLimits::NONE,
 };
 
 pub(super) fn spec(simulation: &mut Simulation, travel: Travel, misplaced: f64) -> BowlSpec {
@@ -146,9 +147,6 @@ pub(super) fn spec(simulation: &mut Simulation, travel: Travel, misplaced: f64) 
         growth: Some(Growth {
             travel,
             near: 3.0,
-            fastest: f64::INFINITY,
-            loosest: 0.0,
-            warmest: f64::INFINITY,
             misplaced,
         }),
     }
@@ -584,7 +582,11 @@ fn loose_and_warm_grains_move_the_box() {
         let mut whole = rested();
         let mut spec = spec(&mut whole, TRAVEL, f64::INFINITY);
         if let Some(growth) = &mut spec.growth {
-            (growth.loosest, growth.warmest) = (0.9, 0.001);
+            growth.travel.dense = DenseLimits {
+                loosest: 0.9,
+                warmest: 0.001,
+                ..DenseLimits::NONE
+            };
         }
         // Before what is warm has cooled, and before waves come from the walls.
         spec.settings.exchange_time = spec.settings.load_time;

@@ -7,7 +7,7 @@ use colluvium_continuum::rheology::MuI;
 use colluvium_coupling::overlap::material_edge::{
     GrainZone, MaterialEdge, MaterialEdgeSpec, Side, Travel,
 };
-use colluvium_coupling::overlap::{OverlapSettings, Scales};
+use colluvium_coupling::overlap::{DenseLimits, OverlapSettings, Reason, Scales};
 use colluvium_dem::preparation::*;
 use colluvium_dem::*;
 use nalgebra::Vector3;
@@ -334,6 +334,7 @@ pub const TRAVEL: Travel = Travel {
     hold: 0.4,
     budget: f64::INFINITY,
     fewest: 20.0,
+    dense: DenseLimits::NONE,
 };
 
 /// A column without a gate, its edge close behind the front: grains are put back where the continuum begins to move, and
@@ -368,6 +369,39 @@ fn an_edge_goes_with_the_flow_and_keeps_its_books() {
     let mut blind = account;
     blind.handed = [0.0; 2];
     assert!(blind.grains_error(now) > 1e-9);
+}
+
+/// An edge that nothing wakes comes back for what its continuum cannot be, and stays where limits are met: those of what is
+/// sheared fast, of grains that are loose, and of grains that are warm.
+#[test]
+fn an_edge_comes_back_for_what_no_dense_continuum_is() {
+    let moves = |dense: DenseLimits| {
+        let travel = Travel {
+            rest: 1e-6,
+            wake: 1e3,
+            dense,
+            ..TRAVEL
+        };
+        let mut joined = Joined::with_edge(false, false, 11.0, Some(travel));
+        joined.advance(4.0, 1.0);
+        let moves = joined.edge().moves().iter();
+        let found: Vec<_> = moves.map(|m| (m.reason, m.value)).collect();
+        println!("{dense:?}: {found:?}");
+        found
+    };
+    let none = DenseLimits::NONE;
+    assert!(moves(none).is_empty());
+    let fastest = |fastest| moves(DenseLimits { fastest, ..none });
+    let loosest = |loosest| moves(DenseLimits { loosest, ..none });
+    let warmest = |warmest| moves(DenseLimits { warmest, ..none });
+    for (found, met, reason) in [
+        (fastest(1e-3), fastest(10.0), Reason::Inertial),
+        (loosest(0.99), loosest(0.5), Reason::Loose),
+        (warmest(1e-3), warmest(1.0), Reason::Warm),
+    ] {
+        assert!(met.is_empty(), "{met:?}");
+        assert!(!found.is_empty() && found.iter().all(|(why, _)| *why == reason));
+    }
 }
 
 /// What an edge remembers comes back from its numbers, strips and moves included; a budget keeps it where it is.

@@ -7,7 +7,7 @@ use super::collapse_zones::{DENSE, FEWEST_GRAINS};
 use super::world::{Materials, Place};
 use colluvium_coupling::overlap::bowl::Growth;
 use colluvium_coupling::overlap::material_edge::Travel;
-use colluvium_coupling::overlap::{Resolved, Scales};
+use colluvium_coupling::overlap::{DenseLimits, Resolved, Scales};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -304,11 +304,13 @@ impl BallImpactScene {
                 hold: zones.hold_scaled * (2.0 * self.ball_radius() / self.gravity).sqrt(),
                 budget: zones.budget.map_or(f64::INFINITY, |most| most as f64),
                 fewest: FEWEST_GRAINS,
+                dense: DenseLimits {
+                    fastest: zones.fastest_inertial.unwrap_or(valid),
+                    loosest: zones.loosest_scaled.unwrap_or(0.0),
+                    warmest: zones.warmest_share.unwrap_or(f64::INFINITY),
+                },
             },
             near: self.near_diameters() * diameter,
-            fastest: zones.fastest_inertial.unwrap_or(valid),
-            loosest: zones.loosest_scaled.unwrap_or(0.0),
-            warmest: zones.warmest_share.unwrap_or(f64::INFINITY),
             misplaced: zones.misplaced_shear.unwrap_or(f64::INFINITY),
         })
     }

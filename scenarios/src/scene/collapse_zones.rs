@@ -5,7 +5,9 @@ use super::overlap_width::OverlapWidth;
 use super::world::Place;
 use super::{CollapseScene, SceneError};
 use colluvium_coupling::overlap::material_edge::Travel;
-use colluvium_coupling::overlap::{NormalMotion, OverlapError, OverlapSettings, Resolved, Scales};
+use colluvium_coupling::overlap::{
+    DenseLimits, NormalMotion, OverlapError, OverlapSettings, Resolved, Scales,
+};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
 
@@ -44,6 +46,21 @@ pub struct ColumnZoneKeys {
     #[serde(default = "holds")]
     #[schemars(extend("minimum" = 0.0, "maximum" = 1000.0))]
     pub hold_scaled: f64,
+    /// Inertial number above which the continuum behind a moving edge becomes grains again, where a tenth of it exceeds it. Left
+    /// out: none does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1.0e6))]
+    pub fastest_inertial: Option<f64>,
+    /// Solid fraction of the grains in the inner overlap of a moving edge, over that of the settled column, below which what is
+    /// behind it becomes grains again. Left out: none does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "exclusiveMaximum" = 1.0))]
+    pub loosest_scaled: Option<f64>,
+    /// Part of the pressure there that fluctuations of velocity make (kinetic over whole pressure) above which it does. Left out:
+    /// none does.
+    #[serde(default, skip_serializing_if = "Option::is_none")]
+    #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 100.0))]
+    pub warmest_share: Option<f64>,
     /// The edge by the oracle instead: a run of the continuum alone comes first, and material that makes more strain
     /// than this under a friction in doubt is grains.
     #[serde(default, skip_serializing_if = "Option::is_none")]
@@ -66,8 +83,27 @@ impl Default for ColumnZoneKeys {
             rest_speed_scaled: rests(),
             wake_speed_scaled: wakes(),
             hold_scaled: holds(),
+            fastest_inertial: None,
+            loosest_scaled: None,
+            warmest_share: None,
             tolerance: None,
             budget: None,
+        }
+    }
+}
+
+impl ColumnZoneKeys {
+    /// What grains are needed for behind a moving edge, beside what moves.
+    pub fn dense_limits(&self) -> DenseLimits {
+        let DenseLimits {
+            fastest,
+            loosest,
+            warmest,
+        } = DenseLimits::NONE;
+        DenseLimits {
+            fastest: self.fastest_inertial.unwrap_or(fastest),
+            loosest: self.loosest_scaled.unwrap_or(loosest),
+            warmest: self.warmest_share.unwrap_or(warmest),
         }
     }
 }
@@ -290,6 +326,7 @@ impl CollapseScene {
             hold: self.zones.hold_scaled * (self.height / self.gravity).sqrt(),
             budget: self.zones.budget.map_or(f64::INFINITY, |most| most as f64),
             fewest: FEWEST_GRAINS,
+            dense: self.zones.dense_limits(),
         })
     }
 
@@ -357,6 +394,18 @@ impl CollapseScene {
         if zones.budget.is_some() && zones.tolerance.is_none() && !zones.moving {
             let range = "given with zones.tolerance or zones.moving = true: an edge that is given and stays has no other number of grains";
             return Err(at("zones").refuse("budget", zones.budget.unwrap_or(0), range));
+        }
+        let given = [
+            ("fastest_inertial", zones.fastest_inertial),
+            ("loosest_scaled", zones.loosest_scaled),
+            ("warmest_share", zones.warmest_share),
+        ];
+        if let Some((key, Some(value))) = given.iter().find(|(_, value)| value.is_some())
+            && !zones.moving
+        {
+            let range =
+                "given with zones.moving = true: an edge that stays makes no room for grains";
+            return Err(at("zones").refuse(key, value, range));
         }
         if let (Some(_), Some(edge)) = (zones.tolerance, zones.edge_scaled) {
             let range = "left out where zones.tolerance is given: the oracle puts the edge";

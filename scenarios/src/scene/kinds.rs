@@ -24,18 +24,21 @@ macro_rules! kinds {
             pub const NAMES: &[&str] = &[$($name),*];
 
             /// Reads the keys of the scene of this name.
-            pub fn read(name: &str, table: toml::Table) -> Option<Result<Kind, toml::de::Error>> {
+            ///
+            /// # Errors
+            /// Keys that the scene does not have; a name that is not of [`Kind::NAMES`].
+            pub fn read(name: &str, table: toml::Table) -> Result<Kind, toml::de::Error> {
                 match name {
-                    $($name => Some(table.try_into().map(|keys| Kind::$variant(Box::new(keys)))),)*
-                    _ => None,
+                    $($name => table.try_into().map(|keys| Kind::$variant(Box::new(keys))),)*
+                    _ => Err(serde::de::Error::custom(format!("no scene is called `{name}`"))),
                 }
             }
 
-            /// The JSON Schema of the scene of this name.
-            pub fn schema(name: &str) -> Option<Value> {
+            /// The JSON Schema of the scene of this name, null where there is none.
+            pub fn schema(name: &str) -> Value {
                 match name {
-                    $($name => Some(schemars::schema_for!($keys).to_value()),)*
-                    _ => None,
+                    $($name => schemars::schema_for!($keys).to_value(),)*
+                    _ => Value::Null,
                 }
             }
 

@@ -1,27 +1,8 @@
-//! How far the grains beside a side of the box are from the dense flow that a μ(I) continuum is a law of.
-//!
-//! Of the grains in a side's inner overlap, in cells beneath the surface,
-//!
-//! ```text
-//! φ/φ_bed = Σ m / (n m_full)                 p_k/p = (Σ m |v − ū(x)|²/3 / n V) / max(p̄, ρ g h/2)
-//! ```
-//! m mass of grains (kg), n cells of volume V (m³), m_full the mass that one of them holds as the bed lay, ū mean velocity of
-//! the grains about a place (m/s), p̄ mean pressure of the continuum's copy (Pa), which has the grains' stresses there, h height of a
-//! cell (m). A continuum of one solid fraction knows no looser state, and none carries the share of pressure that fluctuations
-//! make (kinetic pressure ρ T; Jenkins & Savage, *J. Fluid Mech.* 130 (1983) 187).
+//! How far the grains beside a side of the box are from dense flow.
 
 use super::Bowl;
-use super::oracle::LEAST_PRESSURE;
 use super::zone::Side;
-
-/// What the grains beside a side are like.
-#[derive(Clone, Copy, Debug, PartialEq)]
-pub(super) struct Dilution {
-    /// Solid fraction over that of the bed.
-    pub packing: f64,
-    /// Part of the pressure that fluctuations of velocity make.
-    pub kinetic: f64,
-}
+use crate::overlap::dense_limits::{Dilution, LEAST_PRESSURE};
 
 impl Bowl {
     /// Of a side's inner overlap; none where nothing lies beneath the surface there.

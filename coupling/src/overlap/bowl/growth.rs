@@ -19,11 +19,12 @@
 //! grains is refused and counted. Every move is kept with its reason ([`Move`]).
 
 use super::gradients::{gradient_at, gradients};
-use super::journey::{Growth, Move, Reason};
+use super::journey::{Growth, Move};
 use super::room::Overlaps;
 use super::store::{Store, stretched};
 use super::zone::{SIDES, Side, Zone};
 use super::{Bowl, OverlapError};
+use crate::overlap::dense_limits::Reason;
 use crate::overlap::sighting::free_mass;
 use colluvium_dem::{Grain, Partner, Patch, Simulation};
 use nalgebra::{Matrix3, Vector3};

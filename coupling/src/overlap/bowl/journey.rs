@@ -3,80 +3,20 @@
 use super::room::Overlaps;
 use super::store::{STRETCHES, Store};
 use super::zone::SIDES;
+use crate::overlap::dense_limits::Reason;
 use crate::overlap::material_edge::Travel;
 use colluvium_dem::Patch;
 
 /// When a box grows and shrinks (SI).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Growth {
-    /// Thresholds, the time at rest, and the budget; a strip is as wide as the buffer, whatever its width says.
+    /// Thresholds, the time at rest, limits of dense flow, and the budget; a strip is as wide as the buffer, whatever its width says.
     pub travel: Travel,
     /// Distance between the ball and the inner end of the overlap below which a side moves outwards (m).
     pub near: f64,
-    /// I of the continuum beside a side above which it moves outwards; infinite: none does.
-    pub fastest: f64,
-    /// Solid fraction of the grains in a side's inner overlap over the bed's below which it moves outwards; 0: none does.
-    pub loosest: f64,
-    /// Part of the pressure there that fluctuations of velocity make above which it moves outwards; infinite: none does.
-    pub warmest: f64,
     /// Shear of what is stored above which it is misplaced: a side moves outwards before it, and sheared packings take its
     /// place; infinite: nothing is.
     pub misplaced: f64,
-}
-
-/// Why a side moves.
-#[derive(Clone, Copy, Debug, PartialEq, Eq)]
-pub enum Reason {
-    /// The ball has come near: with its distance from the overlap (m).
-    Ball,
-    /// Grains beside the overlap are fast: with their rms speed (m/s).
-    Speed,
-    /// Nothing moves: with the rms speed (m/s).
-    Rest,
-    /// The caller wants it.
-    Asked,
-    /// The continuum beside it is sheared faster than its law was calibrated for: with its inertial number.
-    Inertial,
-    /// What is stored beside it has been sheared since: with its shear.
-    Misplaced,
-    /// The grains of its inner overlap are packed loosely: with their solid fraction over the bed's.
-    Loose,
-    /// Fluctuations make much of the pressure there: with their share.
-    Warm,
-}
-
-impl Reason {
-    /// All of them, by their numbers.
-    pub const ALL: [Reason; 8] = [
-        Reason::Ball,
-        Reason::Speed,
-        Reason::Rest,
-        Reason::Asked,
-        Reason::Inertial,
-        Reason::Misplaced,
-        Reason::Loose,
-        Reason::Warm,
-    ];
-
-    /// Its number in tables.
-    pub fn number(self) -> usize {
-        self as usize
-    }
-
-    /// Its name.
-    pub fn word(self) -> &'static str {
-        let words = [
-            "ball",
-            "speed",
-            "rest",
-            "asked",
-            "inertial",
-            "misplaced",
-            "loose",
-            "warm",
-        ];
-        words[self as usize]
-    }
 }
 
 /// A move of a side of the box.

@@ -38,7 +38,7 @@ mod zone;
 
 pub use account::{Account, Monitors};
 pub use cells::Cells;
-pub use journey::{Growth, Move, Reason};
+pub use journey::{Growth, Move};
 pub use zone::Zone;
 
 use super::OverlapError;

@@ -4,8 +4,8 @@
 //!
 //! - the ball has come nearer to the inner end of its overlap than asked for;
 //! - the grains of its inner overlap, their rms speed with its fluctuations, are faster than v_wake;
-//! - those grains are packed more loosely than φ_min, or fluctuations make more of the pressure than a share p_k/p ([`dilute`]);
-//! - a tenth of the continuum in the strip beyond it is sheared faster than its law was calibrated for, I > I_max;
+//! - those grains are packed too loosely, or fluctuations make too much of the pressure, or a tenth of the continuum in the strip
+//!   beyond is sheared faster than its law was calibrated for ([`DenseLimits`]);
 //! - what is stored in that strip has been sheared by more than γ_max in the mean since it was put by, so that the law's steady
 //!   friction no longer is that of material as it was put by.
 //!
@@ -13,19 +13,15 @@
 //! others beyond are faster, nothing asks for a move outwards, and the ball is far. Each move outwards of a side doubles the time
 //! that its next one inwards waits for. A move that the budget does not allow is counted once until it is no longer wanted.
 //!
-//! [`dilute`]: super::dilute
+//! [`DenseLimits`]: crate::overlap::DenseLimits
 
 use super::gradients::shear_rate;
-use super::journey::{Growth, Reason};
+use super::journey::Growth;
 use super::store::shear_of;
 use super::zone::{Side, Zone};
 use super::{Bowl, OverlapError};
+use crate::overlap::dense_limits::{LEAST_PRESSURE, Reason};
 use colluvium_dem::{GrainSample, Simulation};
-
-/// Part of the strip beyond a side that may exceed the I that it is judged by.
-const EXCEEDED: f64 = 0.1;
-/// Pressure below which I is taken at it, in weights of a layer of cells.
-pub(super) const LEAST_PRESSURE: f64 = 0.5;
 
 /// What the grains beside a side do.
 #[derive(Clone, Copy, Debug, Default)]
@@ -55,7 +51,8 @@ impl Bowl {
         let needs = near.map(|way| (Reason::Ball, way));
         let needs =
             needs.or_else(|| (beside.inner > travel.wake).then_some((Reason::Speed, beside.inner)));
-        let needs = needs.or_else(|| self.needs_dilute(growth, &side));
+        let dense = &travel.dense;
+        let needs = needs.or_else(|| dense.of_grains(|| self.dilution_beside(&side)));
         if let Some(reason) = needs.or_else(|| self.needs_beyond(growth, &side)) {
             self.journey.resting[number] = 0.0;
             let refused = !self.shift(growth, side, true, reason, simulation)?;
@@ -122,23 +119,12 @@ impl Bowl {
         }
     }
 
-    /// What of the grains in the inner overlap of a side no dense continuum beside them can be.
-    fn needs_dilute(&self, growth: &Growth, side: &Side) -> Option<(Reason, f64)> {
-        if growth.loosest <= 0.0 && growth.warmest.is_infinite() {
-            return None;
-        }
-        let found = self.dilution_beside(side)?;
-        let loose = (found.packing < growth.loosest).then_some((Reason::Loose, found.packing));
-        loose.or_else(|| (found.kinetic > growth.warmest).then_some((Reason::Warm, found.kinetic)))
-    }
-
     /// What in the continuum beyond a side, a strip wide, asks for grains.
     fn needs_beyond(&self, growth: &Growth, side: &Side) -> Option<(Reason, f64)> {
-        if growth.fastest.is_finite() {
-            let inertial = self.inertial_beyond(side);
-            if inertial > growth.fastest {
-                return Some((Reason::Inertial, inertial));
-            }
+        let dense = &growth.travel.dense;
+        let fast = dense.of_continuum(|| self.inertial_beyond(side));
+        if fast.is_some() {
+            return fast;
         }
         if growth.misplaced.is_finite() {
             let shear = self.shear_beyond(side);
@@ -155,13 +141,12 @@ impl Bowl {
         layout.zone.moved(&layout.cells, side, self.stride())
     }
 
-    /// I = γ̇ d √(ρ_s/p) that a tenth of the strip beyond a side exceeds. Cells at the surface have no pressure to speak of and do
-    /// not count.
-    fn inertial_beyond(&self, side: &Side) -> f64 {
+    /// I of the cells of the strip beyond a side. Those at the surface have no pressure to speak of and do not count.
+    fn inertial_beyond(&self, side: &Side) -> Vec<f64> {
         let (cells, law, view) = (&self.layout.cells, &self.spec.law, &self.view);
         let (zone, larger) = (&self.layout.zone, self.larger(side));
         let beneath = |cell: usize| cells.above(cell).is_some_and(|above| view.is_full(above));
-        let mut rows: Vec<f64> = (0..cells.count())
+        (0..cells.count())
             .filter(|&cell| {
                 let index = cells.index(cell);
                 let is_strip = zone.label_of_cell(index) < 0.0 && larger.label_of_cell(index) > 0.0;
@@ -173,10 +158,7 @@ impl Bowl {
                 let least = LEAST_PRESSURE * self.full() * self.spec.gravity / cells.face_area(2);
                 rate * law.diameter * (law.grain_density / pressure.max(least)).sqrt()
             })
-            .collect();
-        rows.sort_unstable_by(f64::total_cmp);
-        let place = ((1.0 - EXCEEDED) * rows.len() as f64).ceil() as usize;
-        rows.get(place.saturating_sub(1)).copied().unwrap_or(0.0)
+            .collect()
     }
 
     /// Mean shear of what is stored in the strip beyond a side since it was put by.

@@ -8,12 +8,14 @@
 //! Force and impulse of the ground on the continuum are those of a wall: part of what an account says it had from walls
 //! and surface.
 
-use super::{MaterialEdgeSpec, OverlapError, Side};
+use super::{MaterialEdge, MaterialEdgeSpec, OverlapError, Side, Travel};
 use colluvium_continuum::column_collapse::CollapseGround;
 use colluvium_continuum::terrain::Profile;
 
 /// Ground that is off by less than this part of a cell is level.
 const LEVEL: f64 = 1e-9;
+/// Part of a full cell's mass in grains of the overlap from which on a row has some.
+const COVERED: f64 = 0.3;
 
 /// Whether a continuum with these edges ends at a face that is free.
 pub(super) fn has_front(edges: &[MaterialEdgeSpec]) -> bool {
@@ -78,6 +80,53 @@ pub(super) fn check(ground: &CollapseGround, spec: &MaterialEdgeSpec) -> Result<
         value: spec.side.along(level),
         allowed: "level at z = 0 under the column and its overlap",
     })
+}
+
+impl MaterialEdge {
+    /// Moves inwards that were not made, as the ground there is not level: how many, and when the first (s).
+    pub fn stopped_moves(&self) -> Option<(f64, f64)> {
+        let [count, first] = self.journey.stopped;
+        (count > 0.0).then_some((count, first))
+    }
+
+    /// Where it has come to ground that is not level, if it has (m along x), and up to where the ground is level: where the edge is, or
+    /// more of its grains than fill a cell.
+    pub fn beyond_level_ground(&self) -> Option<[f64; 2]> {
+        let grains = self.sighting.snapshot.grains.iter();
+        let beyond = grains.filter(|g| self.labels.of(g).is_some() && g.position.x < self.level);
+        let [mass, farthest] = beyond.fold([0.0, self.level], |[mass, farthest], g| {
+            [mass + g.mass, g.position.x.min(farthest)]
+        });
+        let least = match mass > self.full() {
+            true => farthest,
+            false => self.least_place(),
+        };
+        let ends = [least, self.level].map(|place| self.spec.side.along(place));
+        (least < self.level).then_some(ends)
+    }
+
+    /// Least place of the edge in rows with grains of its overlap (m).
+    fn least_place(&self) -> f64 {
+        let [columns, _] = self.cells.counts;
+        let covers = self.sums.cover.chunks(columns);
+        let full = self.full();
+        let rows = self.held.rows.iter().zip(covers);
+        let there = rows.filter(|(_, covers)| covers.iter().any(|c| c.copied > COVERED * full));
+        there.fold(f64::INFINITY, |least, (row, _)| least.min(row.place))
+    }
+
+    /// Whether the ground is level where a move inwards at a time (s) would put the edge; if not, that is noted.
+    pub(super) fn has_level_ground_for(&mut self, travel: &Travel, time: f64) -> bool {
+        if self.least_place() - travel.width >= self.level {
+            return true;
+        }
+        let [count, first] = &mut self.journey.stopped;
+        if *count == 0.0 {
+            *first = time;
+        }
+        *count += 1.0;
+        false
+    }
 }
 
 #[cfg(test)]

@@ -156,6 +156,10 @@ impl MaterialEdge {
         let Some(strips) = strips.collect() else {
             return Ok(None);
         };
+        let moves = moves.as_chunks().0.iter().map(Move::of).collect();
+        let Some(moves) = moves else {
+            return Ok(None);
+        };
         if base.len() != edge.labels.base.len() {
             return Ok(None);
         }
@@ -163,7 +167,7 @@ impl MaterialEdge {
         edge.labels.edge = at;
         edge.journey = Journey {
             strips,
-            moves: moves.as_chunks().0.iter().map(Move::of).collect(),
+            moves,
             resting,
             returns,
             refused,

@@ -33,6 +33,7 @@ mod floor;
 mod labels;
 mod layout;
 mod memory;
+mod oracle;
 #[cfg(test)]
 mod rotation;
 mod rows;

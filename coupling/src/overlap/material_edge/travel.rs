@@ -6,8 +6,8 @@
 //! - *outwards*, when the grains that would become continuum, or its overlap, have rested for a time: their rms speed
 //!   was below v_rest all the while, and the grains beyond are faster: where nothing flows any more a move spares no
 //!   steps, and shakes what rests. The continuum's copy already weighs what they weigh; they are put by as a strip;
-//! - *inwards*, when the continuum of the last strip moves faster than v_wake > v_rest: its grains are put back with
-//!   the continuum's velocity. Where one of them would lie in a grain that has come there meanwhile, it is laid on top
+//! - *inwards*, when the continuum of the last strip moves faster than v_wake > v_rest, or is sheared faster, or the grains
+//!   beside it are looser or warmer, than a continuum can be ([`DenseLimits`]): its grains are put back with the continuum's velocity. Where one of them would lie in a grain that has come there meanwhile, it is laid on top
 //!   of the heap instead, so that no mass is lost.
 //!
 //! A move gives all labels anew, by where grains are: what has mixed since they were given is cut along a clean edge.
@@ -17,6 +17,7 @@
 //! ([`Move`]).
 
 use super::{Continuum, MaterialEdge, OverlapError};
+use crate::overlap::dense_limits::{DenseLimits, Reason};
 use colluvium_dem::{Grain, GrainSample, Patch, Simulation};
 use nalgebra::Vector3;
 
@@ -35,17 +36,22 @@ pub struct Travel {
     pub budget: f64,
     /// Fewest free grains beyond the overlap.
     pub fewest: f64,
+    /// What else grains are needed for.
+    pub dense: DenseLimits,
 }
 
 /// A move of the edge.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
+#[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Move {
     /// When (s).
     pub time: f64,
     /// Label, from the edge's first place, that the edge has after it (m).
     pub edge: f64,
-    /// Speed that was the reason: rms of grains that rested, or of the continuum that moved (m/s).
-    pub speed: f64,
+    /// Why.
+    pub reason: Reason,
+    /// What was the reason: the rms speed of grains that rested, or of the continuum that moved (m/s), the inertial number, the
+    /// solid fraction over that at the start, or the share of the pressure.
+    pub value: f64,
     /// Mass that became grains; negative: that became continuum (kg).
     pub mass: f64,
     /// Free and fixed grains after it.
@@ -61,23 +67,32 @@ struct Beside {
 }
 
 /// Numbers of a move.
-pub(super) const NUMBERS: usize = 5;
+pub(super) const NUMBERS: usize = 6;
 
 impl Move {
     /// All of it in a row of numbers.
     pub(super) fn numbers(&self) -> [f64; NUMBERS] {
-        [self.time, self.edge, self.speed, self.mass, self.grains]
+        let reason = self.reason.number() as f64;
+        [
+            self.time,
+            self.edge,
+            reason,
+            self.value,
+            self.mass,
+            self.grains,
+        ]
     }
 
-    /// From such numbers.
-    pub(super) fn of(&[time, edge, speed, mass, grains]: &[f64; NUMBERS]) -> Self {
-        Self {
+    /// From such numbers; none of what are not.
+    pub(super) fn of(&[time, edge, reason, value, mass, grains]: &[f64; NUMBERS]) -> Option<Self> {
+        Some(Self {
             time,
             edge,
-            speed,
+            reason: *Reason::ALL.get(reason as usize)?,
+            value,
             mass,
             grains,
-        }
+        })
     }
 }
 
@@ -100,8 +115,6 @@ pub(super) struct Journey {
 
 /// Share of the sum of radii by which a grain that is put back may overlap with one that is there.
 const DEEPEST: f64 = 0.05;
-/// Part of a full cell's mass in grains of the overlap from which on a row has some.
-const COVERED: f64 = 0.3;
 
 /// Which strip behind the edge a grain belongs to, from 0; none: it stays.
 fn strip_of(label: Option<f64>, fixed: bool, floor: f64, width: f64) -> Option<usize> {
@@ -122,38 +135,6 @@ impl MaterialEdge {
     /// Moves inwards that the budget did not allow.
     pub fn refused_moves(&self) -> f64 {
         self.journey.refused
-    }
-
-    /// Moves inwards that were not made, as the ground there is not level: how many, and when the first (s).
-    pub fn stopped_moves(&self) -> Option<(f64, f64)> {
-        let [count, first] = self.journey.stopped;
-        (count > 0.0).then_some((count, first))
-    }
-
-    /// Where it has come to ground that is not level, if it has (m along x), and up to where the ground is level: where the edge is, or
-    /// more of its grains than fill a cell.
-    pub fn beyond_level_ground(&self) -> Option<[f64; 2]> {
-        let grains = self.sighting.snapshot.grains.iter();
-        let beyond = grains.filter(|g| self.labels.of(g).is_some() && g.position.x < self.level);
-        let [mass, farthest] = beyond.fold([0.0, self.level], |[mass, farthest], g| {
-            [mass + g.mass, g.position.x.min(farthest)]
-        });
-        let least = match mass > self.full() {
-            true => farthest,
-            false => self.least_place(),
-        };
-        let ends = [least, self.level].map(|place| self.spec.side.along(place));
-        (least < self.level).then_some(ends)
-    }
-
-    /// Least place of the edge in rows with grains of its overlap (m).
-    fn least_place(&self) -> f64 {
-        let [columns, _] = self.cells.counts;
-        let covers = self.sums.cover.chunks(columns);
-        let full = self.full();
-        let rows = self.held.rows.iter().zip(covers);
-        let there = rows.filter(|(_, covers)| covers.iter().any(|c| c.copied > COVERED * full));
-        there.fold(f64::INFINITY, |least, (row, _)| least.min(row.place))
     }
 
     /// Grains that were laid on top of the heap because their place was taken when they were put back.
@@ -214,10 +195,11 @@ impl MaterialEdge {
             return Ok(false);
         };
         self.carry_strips();
-        let woken = self.continuum_speed(travel.width);
-        if woken > travel.wake && !self.journey.strips.is_empty() {
+        if !self.journey.strips.is_empty()
+            && let Some(reason) = self.needs_grains(&travel)
+        {
             self.journey.resting = 0.0;
-            return self.come_back(&travel, woken, simulation);
+            return self.come_back(&travel, reason, simulation);
         }
         let Beside {
             speed,
@@ -234,7 +216,7 @@ impl MaterialEdge {
         let hold = travel.hold * 2.0_f64.powf(self.journey.returns);
         if self.journey.resting * self.exchange_time() > hold {
             self.journey.resting = 0.0;
-            self.go_out(&travel, speed, continuum, simulation)?;
+            self.go_out(&travel, (Reason::Rest, speed), continuum, simulation)?;
             return Ok(true);
         }
         Ok(false)
@@ -252,30 +234,6 @@ impl MaterialEdge {
                 grain.position += dt * Vector3::new(u, 0.0, w);
                 grain.velocity = Vector3::new(u, 0.0, w);
             }
-        }
-    }
-
-    /// Rms speed of the full cells of continuum within a width behind the edge (m/s).
-    fn continuum_speed(&self, width: f64) -> f64 {
-        let (mut sum, mut weight) = (0.0, 0.0);
-        for (k, row) in self.held.rows.iter().enumerate() {
-            for i in 0..self.cells.counts[0] {
-                let centre = self.cells.centre(i);
-                if centre < row.place - width || centre > row.place {
-                    continue;
-                }
-                let cell = i + self.cells.counts[0] * k;
-                if self.view.is_full(cell) {
-                    let [u, w] = self.view.velocity[cell];
-                    sum += u * u + w * w;
-                    weight += 1.0;
-                }
-            }
-        }
-        if weight > 0.0 {
-            f64::sqrt(sum / weight)
-        } else {
-            0.0
         }
     }
 
@@ -336,7 +294,7 @@ impl MaterialEdge {
     fn go_out(
         &mut self,
         travel: &Travel,
-        speed: f64,
+        reason: (Reason, f64),
         continuum: &mut Continuum,
         simulation: &mut Simulation,
     ) -> Result<(), OverlapError> {
@@ -350,22 +308,17 @@ impl MaterialEdge {
         let patch = simulation.take_out(|g| self.strip(g, travel.width).is_some());
         let mass = -patch.mass();
         self.journey.strips.push(patch);
-        self.handed([speed, mass], before, simulation);
+        self.handed(reason, mass, before, simulation);
         Ok(())
     }
 
     fn come_back(
         &mut self,
         travel: &Travel,
-        speed: f64,
+        reason: (Reason, f64),
         simulation: &mut Simulation,
     ) -> Result<bool, OverlapError> {
-        if self.least_place() - travel.width < self.level {
-            let [count, first] = &mut self.journey.stopped;
-            if *count == 0.0 {
-                *first = simulation.time();
-            }
-            *count += 1.0;
+        if !self.has_level_ground_for(travel, simulation.time()) {
             return Ok(false);
         }
         let strips = &self.journey.strips;
@@ -395,12 +348,18 @@ impl MaterialEdge {
         self.give_labels(places);
         self.labels.edge -= travel.width;
         self.journey.returns += 1.0;
-        self.handed([speed, mass], before, simulation);
+        self.handed(reason, mass, before, simulation);
         Ok(true)
     }
 
     /// Books a move, and agrees on what holds after it.
-    fn handed(&mut self, [speed, mass]: [f64; 2], before: [f64; 2], simulation: &mut Simulation) {
+    fn handed(
+        &mut self,
+        (reason, value): (Reason, f64),
+        mass: f64,
+        before: [f64; 2],
+        simulation: &mut Simulation,
+    ) {
         let now = self.held_momentum(simulation);
         for axis in 0..2 {
             self.account.handed[axis] += now[axis] - before[axis];
@@ -411,7 +370,8 @@ impl MaterialEdge {
         self.journey.moves.push(Move {
             time: simulation.time(),
             edge: self.labels.edge,
-            speed,
+            reason,
+            value,
             mass,
             grains: simulation.grain_count() as f64,
         });

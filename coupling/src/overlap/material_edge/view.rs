@@ -94,6 +94,12 @@ impl View {
         ]
     }
 
+    /// Shear rate γ̇ = √(2 D:D) of the material, D traceless (1/s).
+    pub fn shear_rate(&self, cells: &Cells, cell: usize) -> f64 {
+        let [[ux, wx], [uz, wz]] = self.gradient(cells, cell);
+        f64::hypot(ux - wz, uz + wx)
+    }
+
     /// Rotation rate of the material about y, (∂u/∂z − ∂w/∂x)/2 (1/s).
     pub fn rotation(&self, cells: &Cells, cell: usize) -> f64 {
         let [[_, wx], [uz, _]] = self.gradient(cells, cell);

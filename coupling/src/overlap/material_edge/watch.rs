@@ -6,6 +6,7 @@ use super::exchange::STEEPEST;
 use super::rows::slopes;
 use super::witness::Through;
 use colluvium_dem::GrainSample;
+use nalgebra::Vector3;
 
 /// How far beyond the edge a grain has escaped, in diameters.
 const ESCAPED: f64 = 1.0;
@@ -46,6 +47,16 @@ impl MaterialEdge {
         self.sighting.snapshot.grains.iter().filter(far).count()
     }
 
+    /// Velocity of a grain less the mean velocity of the cells around it, v′ (m/s).
+    pub(super) fn fluctuation(&self, grain: &GrainSample) -> Vector3<f64> {
+        let mut about = grain.velocity;
+        for (cell, hat) in self.cells.hats(grain.position.x, grain.position.z) {
+            let [u, w] = self.sums.cover[cell].velocity();
+            about -= hat * Vector3::new(u, 0.0, w);
+        }
+        about
+    }
+
     /// Granular temperature ⟨v′²⟩/3 about the mean velocity of the cells around each grain: of the buffer, of the inner overlap,
     /// and of grains beyond it up to its width (m²/s²).
     fn temperatures(&self) -> [f64; 3] {
@@ -58,12 +69,7 @@ impl MaterialEdge {
             else {
                 continue;
             };
-            let mut about = grain.velocity;
-            for (cell, hat) in self.cells.hats(grain.position.x, grain.position.z) {
-                let [u, w] = self.sums.cover[cell].velocity();
-                about -= hat * nalgebra::Vector3::new(u, 0.0, w);
-            }
-            sums[zone][0] += grain.mass * about.norm_squared() / 3.0;
+            sums[zone][0] += grain.mass * self.fluctuation(grain).norm_squared() / 3.0;
             sums[zone][1] += grain.mass;
         }
         sums.map(|[energy, mass]| over(energy, mass))

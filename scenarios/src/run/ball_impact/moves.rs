@@ -2,7 +2,8 @@
 
 use crate::summary::{Quantity, Summary};
 use crate::table::Table;
-use colluvium_coupling::overlap::bowl::{Bowl, Move, Reason};
+use colluvium_coupling::overlap::Reason;
+use colluvium_coupling::overlap::bowl::{Bowl, Move};
 
 /// Sides of a box by their numbers.
 const SIDES: [&str; 5] = ["x low", "x high", "y low", "y high", "bottom"];

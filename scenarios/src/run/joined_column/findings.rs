@@ -11,8 +11,8 @@ use crate::scene::{ColumnFloorKind, DENSE, GrainIntervals, overlap_words};
 use crate::state_hash;
 use crate::summary::{Figure, Quantity, Summary};
 use crate::table::Table;
-use colluvium_coupling::overlap::bowl::Reason;
-use colluvium_coupling::overlap::material_edge::{GrainZone, MaterialEdge, Move};
+use colluvium_coupling::overlap::Reason;
+use colluvium_coupling::overlap::material_edge::{GrainZone, MaterialEdge, Move, Travel};
 
 /// Limits of the monitors: slip over √(g H), ratio of forces less 1, share of the relaxation.
 const MOST_SLIP: f64 = 0.01;
@@ -79,6 +79,9 @@ impl JoinedColumn<'_> {
                     s.rest_strain
                 ),
             ));
+            if let Some(travel) = scene.travel(&s) {
+                lines.push(("moves".into(), travel_in_words(&travel)));
+            }
         }
         let law = match scene.grains.calibrated.word() {
             Some(word) => format!("the law calibrated for `{word}` (|τ|/p)"),
@@ -528,6 +531,32 @@ fn sides(
     ]
 }
 
+/// When an edge moves.
+fn travel_in_words(travel: &Travel) -> String {
+    let limit = |value: f64, is_one: bool, key: &str| match is_one {
+        true => format!("{value} (zones.{key})"),
+        false => format!("none (zones.{key} left out)"),
+    };
+    let dense = &travel.dense;
+    format!(
+        "by {:.4} m outwards where grains beside an edge have been slower than {:.3e} m/s (zones.rest_speed_scaled) for {:.3e} s \
+         (zones.hold_scaled); back, within {}, where the continuum behind it is faster than {:.3e} m/s (zones.wake_speed_scaled) or sheared \
+         faster than I = {}, or grains beside it are packed to less than {} of their solid fraction at the start, or fluctuations make more \
+         than {} of the pressure there",
+        travel.width,
+        travel.rest,
+        travel.hold,
+        match travel.budget.is_finite() {
+            true => format!("{} grains (zones.budget)", travel.budget),
+            false => "any number of grains (zones.budget left out)".into(),
+        },
+        travel.wake,
+        limit(dense.fastest, dense.fastest.is_finite(), "fastest_inertial"),
+        limit(dense.loosest, dense.loosest > 0.0, "loosest_scaled"),
+        limit(dense.warmest, dense.warmest.is_finite(), "warmest_share"),
+    )
+}
+
 /// Moves of the edge with their reasons, in a table and in words.
 fn moves(zone: &GrainZone, summary: &mut Summary) -> Option<Table> {
     let edges = zone.edges();
@@ -541,20 +570,28 @@ fn moves(zone: &GrainZone, summary: &mut Summary) -> Option<Table> {
     let mut all: Vec<_> = edges.iter().enumerate().flat_map(of_edge).collect();
     // In one exchange the lower edge moves first.
     all.sort_by(|a, b| a.2.time.total_cmp(&b.2.time));
-    let inwards = all.iter().filter(|(.., m)| m.mass > 0.0).count();
+    let because = |reason: Reason| {
+        let of = all.iter().filter(|(.., m)| m.reason == reason);
+        format!("{} by {}", of.count(), reason.word())
+    };
     let sum = |sign: f64| {
         let of = all.iter().map(|(.., m)| m.mass * sign);
         of.filter(|m| *m > 0.0).sum::<f64>()
     };
+    let reasons = [
+        Reason::Speed,
+        Reason::Loose,
+        Reason::Warm,
+        Reason::Inertial,
+        Reason::Rest,
+    ]
+    .map(because);
     let subject = if edges.len() > 1 { "edges" } else { "edge" };
     summary.remarks.push(format!(
-        "The {subject} moved {} times ({} by {}, {} by {}): {:.3} kg became continuum and {:.3} kg grains again; {} moves inwards were refused by \
+        "The {subject} moved {} times ({}): {:.3} kg became continuum and {:.3} kg grains again; {} moves inwards were refused by \
          zones.budget, and {} grains were laid on top because their place was taken.",
         all.len(),
-        inwards,
-        Reason::Speed.word(),
-        all.len() - inwards,
-        Reason::Rest.word(),
+        reasons.join(", "),
         sum(-1.0),
         sum(1.0),
         edges.iter().map(MaterialEdge::refused_moves).sum::<f64>(),
@@ -568,23 +605,15 @@ fn moves(zone: &GrainZone, summary: &mut Summary) -> Option<Table> {
             ));
         }
     }
-    let reason = |m: &Move| match m.mass > 0.0 {
-        true => Reason::Speed,
-        false => Reason::Rest,
-    };
     let column = |f: fn(&Move) -> f64| all.iter().map(|(.., m)| f(m)).collect::<Vec<f64>>();
-    let reasons = all
-        .iter()
-        .map(|(.., m)| reason(m).number() as f64)
-        .collect();
     let places = all.iter().map(|(_, place, _)| *place).collect();
     let sides = all.iter().map(|(side, ..)| *side as f64).collect();
     let table = Table::new("moves")
         .with("t", "s", column(|m| m.time))
         .with("side", "1", sides)
         .with("edge", "m", places)
-        .with("reason", "1", reasons)
-        .with("speed", "m/s", column(|m| m.speed))
+        .with("reason", "1", column(|m| m.reason.number() as f64))
+        .with("value", "m/s or 1", column(|m| m.value))
         .with("mass", "kg", column(|m| m.mass))
         .with("grains", "1", column(|m| m.grains));
     (!all.is_empty()).then_some(table)

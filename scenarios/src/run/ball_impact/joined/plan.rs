@@ -99,19 +99,22 @@ impl JoinedBed<'_> {
             "a side goes outwards, too, where the continuum beside it is sheared faster than I = {}, or what is stored there has been \
              sheared by more than {}, or grains of its inner overlap are packed to less than {} of the bed's solid fraction, or fluctuations \
              make more than {} of the pressure there; {back}",
-            match (scene.zones.fastest_inertial, growth.fastest.is_finite()) {
+            match (
+                scene.zones.fastest_inertial,
+                growth.travel.dense.fastest.is_finite()
+            ) {
                 (None, true) => format!(
                     "{:.3} (computed: the calibrated law's range ends there; zones.fastest_inertial left out)",
-                    growth.fastest
+                    growth.travel.dense.fastest
                 ),
-                _ => limit(growth.fastest, "zones.fastest_inertial"),
+                _ => limit(growth.travel.dense.fastest, "zones.fastest_inertial"),
             },
             limit(growth.misplaced, "zones.misplaced_shear"),
-            match growth.loosest > 0.0 {
-                true => limit(growth.loosest, "zones.loosest_scaled"),
+            match growth.travel.dense.loosest > 0.0 {
+                true => limit(growth.travel.dense.loosest, "zones.loosest_scaled"),
                 false => limit(f64::INFINITY, "zones.loosest_scaled"),
             },
-            limit(growth.warmest, "zones.warmest_share"),
+            limit(growth.travel.dense.warmest, "zones.warmest_share"),
         )
     }
 
