@@ -206,7 +206,13 @@ fn a_killed_continuum_between_grains_goes_on_in_the_middle_of_an_exchange() {
 
 #[test]
 fn a_killed_front_over_a_slope_goes_on_in_the_middle_of_an_exchange() {
-    killed_between_edges(FRONT_ON_A_SLOPE, 29);
+    let sets = [
+        SMALL_JOINED_COLUMN,
+        FRONT_ON_A_SLOPE,
+        &["duration_scaled=1.5", "output.frames=4"],
+    ]
+    .concat();
+    killed_and_whole("column-collapse", &sets, 29, 2);
 }
 
 /// Before and after its debris has become a continuum.

@@ -354,8 +354,10 @@ impl<'a> JoinedColumn<'a> {
         if reached + least > level {
             return Err(off_level_ground(reached, level, "begin", keys));
         }
-        let mut edges = live.zone.edges().iter();
-        match edges.find_map(MaterialEdge::beyond_level_ground) {
+        // Where nothing is exchanged grains fall out of an edge, and nobody takes them for a joint.
+        let edges = live.zone.edges().iter();
+        let mut joined = edges.filter(|edge| !edge.spec().settings.uncoupled);
+        match joined.find_map(MaterialEdge::beyond_level_ground) {
             None => Ok(()),
             Some([reached, level]) => Err(off_level_ground(reached, level, "end", "zones.x")),
         }
