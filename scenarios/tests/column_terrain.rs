@@ -167,8 +167,9 @@ fn front_as_grains(sets: &[&str], [most_apart, most_off]: [f64; 2]) {
         own.map(|(_, found)| found["value"].as_f64().unwrap())
             .sum::<f64>()
     };
-    assert_eq!(escaped(&joined), 0.0);
-    assert!(escaped(&control) > 3.0);
+    let [own, without] = [escaped(&joined), escaped(&control)];
+    println!("grains escaped: joined {own}, nothing exchanged {without}");
+    assert!(own < 0.1 * without, "{own} {without}");
     for name in ["ledger_grains", "ledger_exchange"] {
         assert!(value(&joined, name) < 1e-10, "{name}");
     }
