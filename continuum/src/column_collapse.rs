@@ -266,8 +266,30 @@ impl<L: ShearLaw + Clone> Collapse<L> {
         ground: &CollapseGround,
         top: f64,
     ) -> Result<Self, Error> {
+        Self::bare_at(case, options, ground, (top, None))
+    }
+
+    /// The same with a row of cells that begins at a height `level` (m): ground that is level there cuts no cell.
+    ///
+    /// # Errors
+    /// As [`bare`](Self::bare).
+    pub fn bare_in_rows(
+        case: &CollapseCase<L>,
+        options: &SurfaceOptions,
+        ground: &CollapseGround,
+        [level, top]: [f64; 2],
+    ) -> Result<Self, Error> {
+        Self::bare_at(case, options, ground, (top, Some(level)))
+    }
+
+    fn bare_at(
+        case: &CollapseCase<L>,
+        options: &SurfaceOptions,
+        ground: &CollapseGround,
+        heights: (f64, Option<f64>),
+    ) -> Result<Self, Error> {
         case.validate()?;
-        let (flow, bottom) = case.bare(ground, top, options)?;
+        let (flow, bottom) = case.bare(ground, heights, options)?;
         Ok(Self {
             bottom,
             ground: Some(ground.clone()),

@@ -1,17 +1,18 @@
 //! A column whose face is not free: other matter leans on it.
 
 use colluvium_continuum::Error;
-use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
-use colluvium_continuum::free_surface::{Outside, SpaceFlow, SurfaceOptions};
+use colluvium_continuum::column_collapse::{Collapse, CollapseCase, CollapseGround, Matter};
+use colluvium_continuum::free_surface::{Contact, Outside, SpaceFlow, SurfaceOptions};
 use colluvium_continuum::grid::{Axis, Boundary, Grid};
 use colluvium_continuum::rheology::MuI;
+use colluvium_continuum::terrain::Profile;
 
 /// Cells over the height, which is the width; in natural units the column is 1 high.
 const ROWS: usize = 16;
 const COLUMNS: usize = 40;
 
-fn column() -> Collapse {
-    let case = CollapseCase {
+fn case() -> CollapseCase {
+    CollapseCase {
         aspect: 1.0,
         height: 2.0,
         gravity: 9.81,
@@ -19,8 +20,45 @@ fn column() -> Collapse {
         cells: COLUMNS,
         length_scaled: COLUMNS as f64 / ROWS as f64,
         overhang_degrees: 0.0,
+    }
+}
+
+fn column() -> Collapse {
+    Collapse::new(&case(), &SurfaceOptions::default()).unwrap()
+}
+
+/// The same on ground that is level under it and up to 1.8 heights, and goes down beyond.
+fn column_on_ground() -> Collapse {
+    let slope = vec![[0.0, 0.0], [3.6, 0.0], [5.1, -0.7]];
+    let ground = CollapseGround {
+        profile: Profile::new(slope).unwrap(),
+        contact: Contact::NoSlip,
     };
-    Collapse::new(&case, &SurfaceOptions::default()).unwrap()
+    let mut collapse =
+        Collapse::bare_in_rows(&case(), &SurfaceOptions::default(), &ground, [0.0, 2.0]).unwrap();
+    let below = rows_below(&collapse);
+    let cells = collapse.flow().state().fractions.len();
+    let rows = cells / COLUMNS;
+    let fractions = (0..cells).map(|cell| {
+        let is_column = cell % COLUMNS < ROWS && (below..below + ROWS).contains(&(cell / COLUMNS));
+        f64::from(u8::from(is_column))
+    });
+    let matter = Matter {
+        fractions: fractions.collect(),
+        velocity: [
+            vec![0.0; (COLUMNS + 1) * rows],
+            vec![0.0; COLUMNS * (rows + 1)],
+        ],
+    };
+    collapse.fill(matter).unwrap();
+    collapse
+}
+
+/// Rows of cells below the column's floor.
+fn rows_below(collapse: &Collapse) -> usize {
+    let rows = -collapse.origin()[1] / collapse.spacing();
+    assert!((rows - rows.round()).abs() < 1e-12, "{rows}");
+    rows.round() as usize
 }
 
 /// Matter outside that bears its weight, with σ_xx = K σ_zz, on the face and, where asked, in the last 6 cells
@@ -28,8 +66,9 @@ fn column() -> Collapse {
 fn leaning(collapse: &Collapse, ratio: f64, shared: bool) -> Outside {
     let cells = collapse.flow().state().fractions.len();
     let mut outside = Outside::nothing(cells);
-    for cell in 0..cells {
-        let (i, k) = (cell % COLUMNS, cell / COLUMNS);
+    let below = rows_below(collapse);
+    for cell in below * COLUMNS..cells {
+        let (i, k) = (cell % COLUMNS, cell / COLUMNS - below);
         let weight = 1.0 - (k as f64 + 0.5) / ROWS as f64;
         if weight > 0.0 {
             outside.pressure[cell] = 0.5 * (1.0 + ratio) * weight;
@@ -53,11 +92,11 @@ fn after(mut collapse: Collapse, outside: Option<Outside>) -> [f64; 2] {
     while collapse.time() < end * (1.0 - 1e-9) {
         speed = collapse.step(end).unwrap().max_speed;
     }
-    let state = collapse.flow().state();
+    let (state, below) = (collapse.flow().state(), rows_below(&collapse));
     let (mut pressure, mut weight) = (0.0, 0.0);
     for k in 0..ROWS - 1 {
         for i in 0..ROWS / 2 {
-            pressure += state.pressure[i + COLUMNS * k];
+            pressure += state.pressure[i + COLUMNS * (k + below)];
             weight += 1.0 - (k as f64 + 0.5) / ROWS as f64;
         }
     }
@@ -90,6 +129,48 @@ fn a_thrust_within_yield_carries_the_column_and_a_smaller_one_does_not() {
     let [falls, _] = after(column(), Some(leaning(&column(), 0.1, true)));
     println!("K = 0.1: speed {falls:.3}");
     assert!(falls > 0.01 && falls > 20.0 * speed, "{falls}");
+}
+
+/// What leans on a column does so on ground as on a floor.
+#[test]
+fn a_column_on_ground_is_leaned_on_as_on_a_floor() {
+    let on_ground = column_on_ground();
+    assert!(rows_below(&on_ground) > 5);
+    let [speed, pressure] = after(column_on_ground(), Some(leaning(&on_ground, 1.0, false)));
+    println!("level pressure: speed {speed:.1e}, pressure {pressure:.9}");
+    assert!(speed < 1e-9 && (pressure - 1.0).abs() < 1e-9);
+    let [falls, _] = after(column_on_ground(), None);
+    assert!(falls > 0.2, "{falls}");
+    let thrust = |of: fn() -> Collapse| after(of(), Some(leaning(&of(), 0.6, true)));
+    let [floor, ground] = [thrust(column), thrust(column_on_ground)];
+    println!("K = 0.6: floor {floor:?}, ground {ground:?}");
+    assert!(ground[0] < 1e-3 && (ground[1] / floor[1] - 1.0).abs() < 2e-3);
+}
+
+/// A force on the matter of a cell moves it by as much on ground as on a floor, and what no face takes is booked.
+#[test]
+fn forces_from_outside_push_matter_on_ground() {
+    let impulse = |mut collapse: Collapse, force: f64| {
+        let mut outside = leaning(&collapse, 1.0, false);
+        let below = rows_below(&collapse);
+        outside.force[ROWS / 2 + COLUMNS * (below + ROWS - 2)] = [force, 0.0];
+        outside.force[COLUMNS - 2 + COLUMNS * (below + ROWS - 2)] = [0.25, 0.0];
+        collapse.flow_mut().set_outside(outside).unwrap();
+        collapse.step(1e-3 * collapse.units().time()).unwrap();
+        let pushed = collapse.flow().state().velocity_time;
+        let untaken = collapse.flow_mut().take_untaken();
+        assert!(
+            (untaken[0] / (0.25 * pushed) - 1.0).abs() < 1e-9,
+            "{untaken:?}"
+        );
+        collapse.flow().momentum()[0] / pushed
+    };
+    for (force, least) in [(0.02, 1e-6), (0.5, 1e-6)] {
+        let [floor, ground] = [column(), column_on_ground()].map(|column| impulse(column, force));
+        println!("force {force}: rate of momentum {floor:.6e} on a floor, {ground:.6e} on ground");
+        assert!(floor > least && (ground / floor - 1.0).abs() < 1e-2);
+    }
+    assert!(impulse(column_on_ground(), 0.0).abs() < 1e-8);
 }
 
 #[test]

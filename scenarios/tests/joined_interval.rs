@@ -227,11 +227,6 @@ fn bad_intervals_are_refused_by_key() {
         ),
         (&["zones.x=[0.1, 3.2]"], "zones.x", "at least 0.3000 m"),
         (&["zones.x=[0.8, 3.9]"], "zones.x", "at least 0.3000 m"),
-        (
-            &["overhang_degrees=10"],
-            "zones.x",
-            "what runs out is grains",
-        ),
         (&["zones.edge_scaled=1"], "zones.edge_scaled", "zones.x"),
         (&["zones.tolerance=0.1"], "zones.x", "the oracle"),
         (

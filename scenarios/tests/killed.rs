@@ -1,8 +1,8 @@
 //! Runs that are killed or stopped at any moment go on to the same state.
 
 use crate::command::{
-    CORE, INSTALMENTS, INTERVAL, MOVING_EDGE, SMALL_COMET_CLIFF, SMALL_HYBRID, SMALL_JOINED_COLUMN,
-    colluvium, hash, pause, succeed, table,
+    CORE, FRONT_ON_A_SLOPE, INSTALMENTS, INTERVAL, MOVING_EDGE, SMALL_COMET_CLIFF, SMALL_HYBRID,
+    SMALL_JOINED_COLUMN, colluvium, hash, pause, succeed, table,
 };
 use crate::packings::{COMET_CLIFF, JOINED_COLUMN, Kept, WIDE_COLUMN};
 use rand::{RngExt, SeedableRng};
@@ -224,6 +224,17 @@ fn a_killed_interval_of_grains_goes_on_in_the_middle_of_an_exchange() {
 #[test]
 fn a_killed_continuum_between_grains_goes_on_in_the_middle_of_an_exchange() {
     killed_between_edges(CORE, 23);
+}
+
+#[test]
+fn a_killed_front_over_a_slope_goes_on_in_the_middle_of_an_exchange() {
+    let sets = [
+        SMALL_JOINED_COLUMN,
+        FRONT_ON_A_SLOPE,
+        &["duration_scaled=1.5", "output.frames=4"],
+    ]
+    .concat();
+    killed_and_whole(Some(&JOINED_COLUMN), ("column-collapse", &sets), 29, 2);
 }
 
 /// Before and after its debris has become a continuum.

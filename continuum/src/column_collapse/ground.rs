@@ -35,6 +35,8 @@ impl CollapseGround {
 
 /// Most cells of a grid over ground.
 const MOST_CELLS: f64 = 4e6;
+/// Ground that reaches below a row by less than this part of a cell does not.
+const ROUNDED: f64 = 1e-9;
 
 /// A grid over ground, in natural units.
 struct Laid {
@@ -46,8 +48,9 @@ struct Laid {
 }
 
 impl<L: ShearLaw + Clone> CollapseCase<L> {
-    /// The grid over ground, with room up to a height (m) at least, and the height of its lower edge (m).
-    fn lay(&self, ground: &CollapseGround, top: f64) -> Result<Laid, Error> {
+    /// The grid over ground, with room up to a height `top` (m) at least and, if it is given, a row of cells that begins at a height
+    /// `level` (m).
+    fn lay(&self, ground: &CollapseGround, top: f64, level: Option<f64>) -> Result<Laid, Error> {
         let spacing = self.length_scaled / self.cells as f64;
         let length = self.length_scaled * self.height;
         require(
@@ -61,7 +64,13 @@ impl<L: ShearLaw + Clone> CollapseCase<L> {
         let units = self.units();
         let [low, high] = ground.span(length).map(|z| z / self.height);
         // A row of ground below, and room above what is highest.
-        let bottom = low - spacing;
+        let bottom = match level.map(|z| z / self.height) {
+            None => low - spacing,
+            Some(level) => {
+                let below = ((level - low) / spacing - ROUNDED).ceil().max(0.0) + 1.0;
+                level - below * spacing
+            }
+        };
         let top = (top / self.height).max(high) + (ROOM_ABOVE - 1.0);
         let rows = ((top - bottom) / spacing).ceil();
         require(
@@ -125,7 +134,7 @@ impl<L: ShearLaw + Clone> CollapseCase<L> {
             "0 over terrain: the column's face stands upright there",
         )?;
         let foot = ground.profile.height_at(0.0).unwrap_or(f64::NAN);
-        let laid = self.lay(ground, foot + self.height)?;
+        let laid = self.lay(ground, foot + self.height, None)?;
         let Laid {
             terrain, spacing, ..
         } = &laid;
@@ -146,14 +155,15 @@ impl<L: ShearLaw + Clone> CollapseCase<L> {
         self.flow_on(laid, fractions, options)
     }
 
-    /// Ground without any matter on it, with room up to a height (m), and the height of the grid's lower edge (m).
+    /// Ground without any matter on it, with room up to a height and a row that begins at another (m), and the height of the
+    /// grid's lower edge (m).
     pub(super) fn bare(
         &self,
         ground: &CollapseGround,
-        top: f64,
+        (top, level): (f64, Option<f64>),
         options: &SurfaceOptions,
     ) -> Result<(SurfaceFlow<L>, f64), Error> {
-        let laid = self.lay(ground, top)?;
+        let laid = self.lay(ground, top, level)?;
         let nothing = vec![0.0; laid.counts.iter().product()];
         self.flow_on(laid, nothing, options)
     }

@@ -1,7 +1,6 @@
 //! Fields at the centres of filled cells, for pictures and tables.
 
 use super::flow::SurfaceFlow;
-use super::operators::points_of;
 use super::topology::NONE;
 use crate::discretisation::COMPONENTS;
 use crate::grid::{Axis, Boundary, DIMENSIONS, unflatten};
@@ -68,7 +67,6 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
     pub fn cell_fields(&self) -> Vec<CellFields<D, C>> {
         let grid = self.grid();
         let spacing = grid.axes().map(|axis| axis.spacing());
-        let points_in_cell = points_of(D);
         let (state, (topology, rheology, floor)) = (self.state(), self.parts());
         let filled = |cell: usize| state.fractions[cell] > EMPTY;
         let faces = |cell: usize, axis: usize| {
@@ -120,7 +118,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             let strain_rate = strain_rate_norm(rate);
             let pressure = state.pressure[cell].max(0.0);
             let flows = strain_rate > RIGID * floor;
-            let points = &state.stress[cell * points_in_cell..(cell + 1) * points_in_cell];
+            let points = self.stresses_in(cell);
             let index = unflatten(cell, grid.cell_counts());
             fields.push(CellFields {
                 lower: std::array::from_fn(|axis| index[axis] as f64 * spacing[axis]),
@@ -129,7 +127,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                 velocity: own,
                 pressure,
                 stress: std::array::from_fn(|k| {
-                    points.iter().map(|s| s[k]).sum::<f64>() / points_in_cell as f64
+                    points.iter().map(|s| s[k]).sum::<f64>() / points.len() as f64
                 }),
                 strain_rate,
                 flows,

@@ -17,6 +17,7 @@ use super::faces::ACTIVE;
 use super::ground::Ground;
 use super::ground::shores::Shores;
 use super::open_ends::OpenEnds;
+use super::operators::points_of;
 use super::outside::Outside;
 use super::plane::Plane;
 use super::sliding::SlidingPlaces;
@@ -85,7 +86,7 @@ pub struct SurfaceFlow<
 pub type SpaceFlow<R> = SurfaceFlow<R, 3, SPACE_COMPONENTS, SPACE_VELOCITIES>;
 
 impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R, D, C, V> {
-    /// From now on this acts from outside; on a flow over ground nothing does.
+    /// From now on this acts from outside.
     ///
     /// # Errors
     /// What belongs to another grid, or is out of range.
@@ -137,6 +138,12 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         }
         self.state = state;
         Ok(())
+    }
+
+    /// Stresses at the points of a cell, one for each of its corners.
+    pub fn stresses_in(&self, cell: usize) -> &[[f64; C]] {
+        let points = points_of(D);
+        &self.state.stress[cell * points..(cell + 1) * points]
     }
 
     /// Where the time went.

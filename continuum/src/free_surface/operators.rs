@@ -491,7 +491,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
 
     /// What the pressure on a surface that is not free adds to the one extrapolated through it into a cell, by
     /// p = f p_active + (1 − f) p_surface.
-    fn pressure_beyond(&self, cell: usize, factor: f64) -> f64 {
+    pub(super) fn pressure_beyond(&self, cell: usize, factor: f64) -> f64 {
         self.outside.map_or(0.0, |outside| {
             (1.0 - factor) * outside.on_surface(cell, cell, 0.0)
         })

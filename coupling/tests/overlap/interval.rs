@@ -1,6 +1,7 @@
 //! Grains between two continua: what one edge does, two do, each on its own side.
 
 use super::material::{HEIGHT, Joined, TRAVEL, settle, settled_fraction, setup_of, spec};
+use colluvium_continuum::column_collapse::CollapseGround;
 use colluvium_coupling::overlap::material_edge::{
     GrainZone, MaterialEdgeSpec, Monitors, Side, Travel,
 };
@@ -38,7 +39,7 @@ pub fn below(uncoupled: bool, place: f64, travel: Option<Travel>) -> MaterialEdg
 }
 
 /// An edge above grains up to `place`, with a continuum up to a gate, or one whose face is free.
-fn above(uncoupled: bool, place: f64, gate: bool, travel: Option<Travel>) -> MaterialEdgeSpec {
+pub fn above(uncoupled: bool, place: f64, gate: bool, travel: Option<Travel>) -> MaterialEdgeSpec {
     MaterialEdgeSpec {
         side: Side::Above,
         place: -place,
@@ -56,14 +57,21 @@ fn both(uncoupled: bool, gate: bool, travel: Option<Travel>) -> [MaterialEdgeSpe
 }
 
 pub fn joined(grains: Vec<Grain>, gate: bool, specs: &[MaterialEdgeSpec]) -> Joined {
-    Joined::cut(
-        Simulation::new(setup_of(LENGTH, grains, gate)).unwrap(),
-        specs,
-    )
+    joined_over(grains, gate, specs, None)
+}
+
+fn joined_over(
+    grains: Vec<Grain>,
+    gate: bool,
+    specs: &[MaterialEdgeSpec],
+    ground: Option<&CollapseGround>,
+) -> Joined {
+    let simulation = Simulation::new(setup_of(LENGTH, grains, gate)).unwrap();
+    Joined::cut_over(simulation, specs, ground)
 }
 
 /// Mass, momentum and what both sides gave each other close over both edges.
-fn books_close(joined: &mut Joined) {
+pub fn books_close(joined: &mut Joined) {
     let zone = &joined.zone;
     let account = zone.account(&joined.simulation);
     let owed = zone.owed(&joined.simulation);
@@ -146,7 +154,7 @@ pub fn rests(specs: &[MaterialEdgeSpec], controls: &[MaterialEdgeSpec], most: f6
 }
 
 /// Largest difference of two rows over the largest of either.
-fn apart(one: &[f64], other: &[f64]) -> f64 {
+pub fn apart(one: &[f64], other: &[f64]) -> f64 {
     assert_eq!(one.len(), other.len());
     let most = one
         .iter()
@@ -181,8 +189,17 @@ fn mirrored_grains_bear_mirrored_loads() {
 
 /// Edges and their images bear mirrored loads but for a part, after some time and after twice that.
 pub fn mirror(specs: &[MaterialEdgeSpec], images: &[MaterialEdgeSpec], most: f64) {
-    let mut own = joined(settled().to_vec(), true, specs);
-    let mut image = joined(mirrored(), true, images);
+    mirror_over((specs, images), [None; 2], most);
+}
+
+/// The same over ground and its image.
+pub fn mirror_over(
+    (specs, images): (&[MaterialEdgeSpec], &[MaterialEdgeSpec]),
+    grounds: [Option<&CollapseGround>; 2],
+    most: f64,
+) {
+    let mut own = joined_over(settled().to_vec(), true, specs, grounds[0]);
+    let mut image = joined_over(mirrored(), true, images, grounds[1]);
     for _ in 0..2 {
         own.advance(0.5, 1.0);
         image.advance(0.5, 1.0);
@@ -234,7 +251,12 @@ fn both_edges_keep_their_books_while_a_column_collapses() {
 
 /// Such a column with edges that move.
 pub fn collapse(specs: &[MaterialEdgeSpec]) {
-    let mut joined = joined(settled().to_vec(), false, specs);
+    collapse_over(specs, None);
+}
+
+/// The same over ground.
+pub fn collapse_over(specs: &[MaterialEdgeSpec], ground: Option<&CollapseGround>) -> Joined {
+    let mut joined = joined_over(settled().to_vec(), false, specs, ground);
     joined
         .zone
         .open_angular_book(&mut joined.simulation)
@@ -250,6 +272,7 @@ pub fn collapse(specs: &[MaterialEdgeSpec]) {
     assert!(error < 1e-11, "{error:e}");
     let moves = joined.zone.edges().iter().map(|edge| edge.moves().len());
     assert!(moves.sum::<usize>() > 0);
+    joined
 }
 
 /// All of a zone comes back from its numbers in the middle of an exchange.
@@ -260,14 +283,23 @@ fn a_zone_goes_on_from_its_numbers() {
 
 /// Stops and goes on with the same bits.
 pub fn go_on(specs: &[MaterialEdgeSpec]) {
-    let mut own = joined(settled().to_vec(), false, specs);
+    go_on_over(specs, None);
+}
+
+/// The same over ground.
+pub fn go_on_over(specs: &[MaterialEdgeSpec], ground: Option<&CollapseGround>) {
+    let mut own = joined_over(settled().to_vec(), false, specs, ground);
     own.advance(5.0, 1.0);
     let mut memory = Vec::new();
     own.zone.write(&mut memory);
     let record = own.simulation.checkpoint();
     let resumed = Simulation::resume(setup_of(LENGTH, settled().to_vec(), false), &record).unwrap();
-    let zone = GrainZone::read(specs, &memory, &resumed).unwrap();
-    assert!(GrainZone::read(&specs[..1], &memory, &resumed).is_err());
+    let zone = GrainZone::read(specs, ground, &memory, &resumed).unwrap();
+    let fewer = &specs[..specs.len() - 1];
+    assert!(GrainZone::read(fewer, ground, &memory, &resumed).is_err());
+    if ground.is_some() {
+        assert!(GrainZone::read(specs, None, &memory, &resumed).is_err());
+    }
     let mut other = Joined {
         simulation: resumed,
         zone,
@@ -297,7 +329,7 @@ fn edges_that_enclose_no_grains_are_refused() {
         (vec![], "at least one"),
     ] {
         let mut simulation = Simulation::new(setup_of(LENGTH, settled().to_vec(), true)).unwrap();
-        let refused = GrainZone::cut(&specs, &mut simulation).err().unwrap();
+        let refused = GrainZone::cut(&specs, None, &mut simulation).err().unwrap();
         assert!(refused.to_string().contains(word), "{refused}");
     }
 }

@@ -1,7 +1,7 @@
 //! A column that is continuum behind an edge that moves with the material, and grains in front of it.
 
 use super::world::{DENSITY, STEP, STIFFNESS, law};
-use colluvium_continuum::column_collapse::CollapseCase;
+use colluvium_continuum::column_collapse::{CollapseCase, CollapseGround};
 use colluvium_continuum::free_surface::SurfaceOptions;
 use colluvium_continuum::rheology::MuI;
 use colluvium_coupling::overlap::material_edge::{
@@ -171,8 +171,16 @@ impl Joined {
         )
     }
 
-    pub fn cut(mut simulation: Simulation, specs: &[MaterialEdgeSpec]) -> Self {
-        let zone = GrainZone::cut(specs, &mut simulation).unwrap();
+    pub fn cut(simulation: Simulation, specs: &[MaterialEdgeSpec]) -> Self {
+        Self::cut_over(simulation, specs, None)
+    }
+
+    pub fn cut_over(
+        mut simulation: Simulation,
+        specs: &[MaterialEdgeSpec],
+        ground: Option<&CollapseGround>,
+    ) -> Self {
+        let zone = GrainZone::cut(specs, ground, &mut simulation).unwrap();
         Self {
             simulation,
             zone,
@@ -406,7 +414,7 @@ fn a_journey_goes_on_from_its_numbers_and_within_its_budget() {
     let record = joined.simulation.checkpoint();
     let spec = *joined.edge().spec();
     let resumed = Simulation::resume(setup(settled().to_vec(), false), &record).unwrap();
-    let zone = GrainZone::read(&[spec], &memory, &resumed).unwrap();
+    let zone = GrainZone::read(&[spec], None, &memory, &resumed).unwrap();
     let mut other = Joined {
         simulation: resumed,
         zone,

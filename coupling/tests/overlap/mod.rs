@@ -14,6 +14,7 @@ mod joined;
 mod loose;
 mod material;
 mod motion;
+mod over_ground;
 mod patch_noise;
 mod pulse;
 mod rest;

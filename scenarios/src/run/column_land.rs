@@ -44,7 +44,7 @@ impl CollapseScene {
             "the end of the floor, grid.length_scaled heights",
         );
         let land = Land::new(&ground.profile, end, self.height, (at, key))?;
-        let lip = self.width() + self.overhang();
+        let lip = self.lip();
         if land.level_up_to() < lip {
             let value = format!("level up to x = {} m", land.level_up_to());
             let range = format!("level under the column, up to {lip:.6} m at least");
@@ -53,7 +53,7 @@ impl CollapseScene {
         Ok(Some(land))
     }
 
-    /// The same ground for the continuum beside the grains.
+    /// The same ground for a continuum, beside grains or with their front.
     pub(super) fn land_of_continuum(
         &self,
         origin: &str,
@@ -64,6 +64,26 @@ impl CollapseScene {
             profile: land.line().clone(),
             contact: collapse_ground::contact(keys.contact, keys.friction),
         }))
+    }
+
+    /// Where the terrain comes from and what it is, in the words of a plan.
+    pub(super) fn terrain_in_words(&self) -> Option<(String, String)> {
+        let keys = self.terrain.as_ref()?;
+        let from = match keys.source().file() {
+            None => "the line of terrain.profile",
+            Some((_, file)) => file,
+        };
+        let land = self.land("").ok().flatten();
+        let shape = land.map_or(String::new(), |land| {
+            let [low, high] = Land::span(Some(&land));
+            let level = match land.level_up_to() {
+                end if end < self.length() => format!("level up to x = {end:.4} m"),
+                _ => "level".to_owned(),
+            };
+            format!(", {level}, from z = {low:.4} to {high:.4} m")
+        });
+        let line = format!("{from}, for grains and continuum{shape}");
+        Some(("terrain".into(), line))
     }
 
     /// What is below the grains, as a smooth wall.

@@ -366,16 +366,7 @@ impl Recipe for CollapseScene {
             None => "none".into(),
         };
         let mut lines = vec![("continuum".into(), beside)];
-        if let Some(keys) = &self.terrain {
-            let from = match keys.source().file() {
-                None => "the line of terrain.profile",
-                Some((_, file)) => file,
-            };
-            lines.push((
-                "terrain".into(),
-                format!("{from}, for grains and continuum"),
-            ));
-        }
+        lines.extend(self.terrain_in_words());
         lines
     }
 

@@ -20,7 +20,7 @@ use crate::scene::{CollapseScene, Scene};
 use crate::summary::Summary;
 use crate::table::Table;
 use crate::vtkhdf::Frame;
-use colluvium_continuum::column_collapse::CollapseCase;
+use colluvium_continuum::column_collapse::{CollapseCase, CollapseGround};
 use colluvium_continuum::rheology::MuI;
 use colluvium_coupling::overlap::OverlapError;
 use colluvium_coupling::overlap::material_edge::{GrainZone, MaterialEdge, MaterialEdgeSpec, Side};
@@ -63,11 +63,15 @@ const HEAD: usize = 2;
 pub(super) fn check(scene: &Scene, body: &CollapseScene) -> Result<(), Failure> {
     with_edge(body, &scene.origin, |column| {
         let named = |why: String| Failure::Input(format!("{}: {why}", scene.origin));
-        for spec in column.specs(crate::scene::DENSE)? {
+        let specs = column.specs(crate::scene::DENSE)?;
+        for spec in &specs {
             spec.case.validate().map_err(|why| named(why.to_string()))?;
             spec.options
                 .validate()
                 .map_err(|why| named(why.to_string()))?;
+        }
+        if let Some(ground) = column.ground()? {
+            GrainZone::check_ground(&specs, &ground).map_err(|why| named(why.to_string()))?;
         }
         super::world::course::check(scene, column)
     })
@@ -114,6 +118,14 @@ fn failure(error: OverlapError) -> Failure {
         }
         error => Failure::Run(error.to_string()),
     }
+}
+
+/// An overlap has come to where the ground is not level: grains have to begin or to end farther back.
+fn off_level_ground(reached: f64, level: f64, what: &str, keys: &str) -> Failure {
+    Failure::Run(format!(
+        "the overlap of grains and continuum has come to x = {reached:.4} m, where the ground is no longer level ({level} m): grains \
+         have to {what} farther back ({keys})"
+    ))
 }
 
 impl<'a> JoinedColumn<'a> {
@@ -164,6 +176,14 @@ impl<'a> JoinedColumn<'a> {
         })
     }
 
+    /// The ground under a continuum that has the front, if there is terrain.
+    pub(super) fn ground(&self) -> Result<Option<CollapseGround>, Failure> {
+        match self.scene.has_front_of_continuum() {
+            true => self.scene.land_of_continuum(&self.origin),
+            false => Ok(None),
+        }
+    }
+
     /// What the column is joined from at each edge, at a solid fraction.
     pub(super) fn specs(&self, solid_fraction: f64) -> Result<Vec<MaterialEdgeSpec>, Failure> {
         let edges = self.scene.edges();
@@ -196,6 +216,11 @@ impl<'a> JoinedColumn<'a> {
                 [scene.length(), back].map(|x| side.along(x))
             }
         };
+        // The face of the column is that of the continuum that has its front.
+        let overhang_degrees = match (side, other) {
+            (Side::Above, None) => scene.overhang_degrees,
+            _ => 0.0,
+        };
         Ok(MaterialEdgeSpec {
             case: CollapseCase {
                 aspect: scene.aspect,
@@ -204,7 +229,7 @@ impl<'a> JoinedColumn<'a> {
                 rheology: self.law(solid_fraction)?,
                 cells: scene.joined_cells(),
                 length_scaled: scene.grid.length_scaled,
-                overhang_degrees: scene.overhang_degrees,
+                overhang_degrees,
             },
             options: super::collapse::options(scene),
             side,
@@ -240,7 +265,8 @@ impl<'a> JoinedColumn<'a> {
         let (own, course) = rest
             .split_at_checked(head[1] as usize)
             .ok_or_else(damaged)?;
-        let zone = GrainZone::read(&self.specs(head[0])?, own, simulation).map_err(failure)?;
+        let (specs, ground) = (self.specs(head[0])?, self.ground()?);
+        let zone = GrainZone::read(&specs, ground.as_ref(), own, simulation).map_err(failure)?;
         let course =
             HeapCourse::read(course, self.scene.heap_axis().columns).ok_or_else(damaged)?;
         Ok(Live { zone, course })
@@ -253,7 +279,8 @@ impl<'a> JoinedColumn<'a> {
             simulation.domain(),
             &self.scene.middle(),
         );
-        let zone = GrainZone::cut(&self.specs(solid)?, simulation).map_err(failure)?;
+        let (specs, ground) = (self.specs(solid)?, self.ground()?);
+        let zone = GrainZone::cut(&specs, ground.as_ref(), simulation).map_err(failure)?;
         let mut live = Live {
             zone,
             course: HeapCourse {
@@ -307,7 +334,7 @@ impl<'a> JoinedColumn<'a> {
         }
     }
 
-    /// Refuses to go on where the continuum with its copy of the overlap has come to a slope: its floor is level.
+    /// Refuses to go on where an overlap has come to a slope, or a continuum that has a level floor, with its copy of the overlap.
     fn stands_on_level_ground(&self, live: &Live) -> Result<(), Failure> {
         let Some(land) = self.scene.land(&self.origin)? else {
             return Ok(());
@@ -317,19 +344,23 @@ impl<'a> JoinedColumn<'a> {
             .zone
             .continua()
             .iter()
+            .filter(|continuum| !continuum.has_ground())
             .fold(0.0, |most: f64, continuum| {
                 let (x, h) = continuum.heights();
                 let filled = x.iter().zip(&h).filter(|(_, h)| **h > least);
                 filled.fold(most, |most, (x, _)| most.max(*x))
             });
-        if reached + least <= land.level_up_to() {
-            return Ok(());
+        let (level, keys) = (land.level_up_to(), "zones.edge_scaled, zones.tolerance");
+        if reached + least > level {
+            return Err(off_level_ground(reached, level, "begin", keys));
         }
-        Err(Failure::Run(format!(
-            "the overlap of grains and continuum has come to x = {reached:.4} m, where the ground is no longer level ({} m): grains \
-             have to begin farther back (zones.edge_scaled, zones.tolerance)",
-            land.level_up_to()
-        )))
+        // Where nothing is exchanged grains fall out of an edge, and nobody takes them for a joint.
+        let edges = live.zone.edges().iter();
+        let mut joined = edges.filter(|edge| !edge.spec().settings.uncoupled);
+        match joined.find_map(MaterialEdge::beyond_level_ground) {
+            None => Ok(()),
+            Some([reached, level]) => Err(off_level_ground(reached, level, "end", "zones.x")),
+        }
     }
 
     fn remember(live: &Live, state: &mut Vec<f64>) {
@@ -365,11 +396,15 @@ impl Recipe for JoinedColumn<'_> {
             rest => format!(", of which {rest:.4} m rest and are not computed"),
         };
         let scene = self.scene;
+        let over = match scene.terrain {
+            Some(_) => ", which runs out over the terrain",
+            None => "",
+        };
         let of = |ends: [Option<f64>; 2]| match ends {
             [Some(low), Some(high)] => {
                 format!("between {low:.4} and {high:.4} m from the wall is a continuum")
             }
-            [Some(low), None] => format!("beyond {low:.4} m is a continuum"),
+            [Some(low), None] => format!("beyond {low:.4} m is a continuum{over}"),
             [None, high] => format!(
                 "within {:.4} m of the wall is a continuum{rest}",
                 high.unwrap_or(0.0)

@@ -21,7 +21,8 @@ pub struct ColumnZoneKeys {
     pub edge_scaled: Option<f64>,
     /// Low and high end of the grains along x (m), from the wall, instead of edge_scaled: continuum on both sides of them. At or
     /// beyond the wall, or the foot of the column, grains reach up to it. A list of such intervals, rising, has continuum between
-    /// them: [[0, 1], [2.6, 99]] is grains at the wall and at the front, and a continuum with an edge at each end.
+    /// them: [[0, 1], [2.6, 99]] is grains at the wall and at the front, and a continuum with an edge at each end. A continuum that has
+    /// the column's front runs out over the terrain; edges lie where that is level.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     pub x: Option<GrainIntervals>,
     /// Distance over the column's height, from the wall, within which the material is not computed: it rests behind a

@@ -77,8 +77,12 @@ impl CollapseScene {
         all
     }
 
-    /// What intervals of grains need: continuum behind their edges, grains between their overlaps, a level floor under a
-    /// continuum that flows.
+    /// Whether what runs out is a continuum.
+    pub fn has_front_of_continuum(&self) -> bool {
+        self.continua().iter().any(|[_, high]| high.is_none())
+    }
+
+    /// What intervals of grains need: continuum behind their edges, grains between their overlaps.
     pub(super) fn check_intervals(&self, origin: &str) -> Result<(), SceneError> {
         let Some(intervals) = &self.zones.x else {
             return Ok(());
@@ -142,12 +146,6 @@ impl CollapseScene {
                     },
                 ));
             }
-        }
-        let flows = continua.iter().any(|[_, high]| high.is_none());
-        if flows && (self.terrain.is_some() || self.overhang_degrees != 0.0) {
-            return refuse(format!(
-                "up to the foot of the column, {width:.4} m: with a terrain or overhang_degrees what runs out is grains"
-            ));
         }
         Ok(())
     }

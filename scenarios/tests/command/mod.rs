@@ -92,6 +92,14 @@ pub const CORE: &[&str] = &[
     "zones.x=[[0, 1], [2.6, 99]]",
 ];
 
+/// With these grains lie at its wall, and a continuum with its front runs down a slope.
+pub const FRONT_ON_A_SLOPE: &[&str] = &[
+    "grid.length_scaled=7",
+    "grains.packing=slope",
+    "zones.x=[[0, 1.5]]",
+    "terrain.profile=[[0, 1], [3, 1], [5, 0.45], [8, 0.45]]",
+];
+
 /// Every step of a continuum run stands in `steps.csv`, and what the summary says of the steps follows from it.
 pub fn steps_say_what_the_summary_says(run: &Path) {
     let (header, rows) = table(&run.join("steps.csv"));

@@ -74,6 +74,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 let ways = self.pressures_at(cell, NEAREST_EXTRAPOLATION);
                 for (p, factor) in ways.into_iter().flatten() {
                     found.add(p, factor);
+                    found.known += self.pressure_beyond(cell, factor);
                 }
             }
             return found;
@@ -105,7 +106,9 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 found.add(pressure(behind), -1.0);
             } else if behind != NONE && ground.master[behind] == behind {
                 let fall = self.beyond(beside, behind, axis, side).fall();
-                found.add(p, 1.0 + fall);
+                let factor = 1.0 + fall;
+                found.add(p, factor);
+                found.known += self.pressure_beyond(behind, factor);
             } else {
                 found.add(p, 1.0);
             }
@@ -217,7 +220,9 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             point.add_pressure(beyond, -depth);
         } else if next != NONE && ground.master[next] == next {
             let fall = self.beyond(master, next, axis, away).fall();
-            point.add_pressure(p, 1.0 + depth * fall);
+            let factor = 1.0 + depth * fall;
+            point.add_pressure(p, factor);
+            point.pressure_offset += self.pressure_beyond(next, factor);
         } else {
             point.add_pressure(p, 1.0);
         }

@@ -37,6 +37,8 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 Some(press * self.depth_of_one_cell(around.cells[high], around.cells[low])?)
             });
             if let Some(weight) = depth {
+                let above = self.topology.cell_neighbours[around.cells[high]][D - 1][1];
+                let weight = weight + self.pressure_beyond(above, 0.0);
                 pressure.known += (share(low) + share(high)) * weight;
                 continue;
             }

@@ -261,12 +261,13 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         }
     }
 
-    /// Pressure on the ground under a layer too thin to have one: that of its weight.
+    /// Pressure on the ground under a layer too thin to have one: that of its weight, and of what lies on it.
     pub(super) fn layer_weight(&self, ground: &Ground<D>, cell: usize) -> f64 {
         let axis = D - 1;
         let [thickness, _] = ground.thickness(self.topology, self.fractions, axis, cell);
         let spacing = self.grid.axes()[axis].spacing();
         thickness.min(1.0) * spacing * weight_onto(&self.acceleration, axis, 0)
+            + self.pressure_beyond(cell, 0.0)
     }
 }
 

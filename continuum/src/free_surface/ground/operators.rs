@@ -52,6 +52,9 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 }
             }
         }
+        if let Some(outside) = self.outside {
+            outside.lay(&mut parts, &places, self.faces, self.topology);
+        }
         Operators {
             discretisation: Discretisation::of_parts(self.grid.clone(), parts),
             places,
@@ -109,7 +112,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                             }
                             _ => 0.0,
                         };
-                        let mut force = 0.0;
+                        let (mut force, mut pressed) = (0.0, 0.0);
                         if mass > 0.0 {
                             let fall = if self.faces.pressure[other] == NONE {
                                 self.beyond(member, other, axis, side).fall()
@@ -117,11 +120,19 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                                 1.0
                             };
                             force = outwards * mass * fall / self.grid.axes()[axis].spacing();
+                            if let Some(outside) = self.outside
+                                && self.faces.pressure[ground.master[other]] == NONE
+                            {
+                                // A shore has no surface on the way.
+                                let way = fall.recip().min(1.0);
+                                pressed = force * outside.on_surface(member, other, way);
+                            }
                         }
                         for (j, share) in self.faces.moved_by(axis, face, axis) {
                             if j != NONE {
                                 parts.divergence.push((p, j, outwards * area * share));
                                 parts.gradient.push(force);
+                                parts.boundary_load[j] -= pressed;
                             }
                         }
                     }

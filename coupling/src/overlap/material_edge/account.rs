@@ -128,7 +128,7 @@ impl Account {
         )
     }
 
-    /// What the continuum has had from walls and from the stress on its surface: what is left of its momentum now
+    /// What the continuum has had from walls, from the ground and from the stress on its surface: what is left of its momentum now
     /// (N s).
     pub fn from_walls_and_surface(&self, now: [f64; 2]) -> [f64; 2] {
         [0, 1].map(|axis| {

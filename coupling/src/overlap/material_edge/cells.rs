@@ -9,13 +9,15 @@
 
 use colluvium_dem::{GrainSample, Partner, Snapshot};
 
-/// Cells side by side over a level floor, x fastest (SI).
+/// Cells side by side over a floor that is level at z = 0, x fastest (SI).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Cells {
     /// How many along x and z.
     pub counts: [usize; 2],
-    /// Where the first ones begin along x (m); the floor is at z = 0.
+    /// Where the first ones begin along x (m).
     pub low: f64,
+    /// Rows below z = 0, for ground that goes down.
+    pub below: usize,
     /// Edge of a cell (m).
     pub spacing: f64,
     /// Width of the slab across (m).
@@ -60,7 +62,7 @@ impl Cells {
 
     /// Height of the centres of the cells of a row (m).
     pub fn height(&self, row: usize) -> f64 {
-        (row as f64 + 0.5) * self.spacing
+        (row as f64 + 0.5 - self.below as f64) * self.spacing
     }
 
     /// Cells between the centres of the first ones and a place along x.
@@ -71,12 +73,13 @@ impl Cells {
     fn along(&self, axis: usize, at: f64) -> ([usize; 2], [f64; 2]) {
         let place = match axis {
             0 => self.offset(at),
-            _ => at / self.spacing - 0.5,
+            _ => at / self.spacing - 0.5 + self.below as f64,
         };
+        let first = [0, self.below as i64][axis];
         let low = place.floor();
         let share = place - low;
         let last = self.counts[axis] as i64 - 1;
-        let index = [0, 1].map(|n| (low as i64 + n).clamp(0, last) as usize);
+        let index = [0, 1].map(|n| (low as i64 + n).clamp(first, last) as usize);
         (index, [1.0 - share, share])
     }
 }
@@ -230,9 +233,27 @@ mod tests {
     const CELLS: Cells = Cells {
         counts: [5, 4],
         low: 0.0,
+        below: 0,
         spacing: 0.5,
         slab: 2.0,
     };
+
+    /// Rows below the floor change the numbers of the others and nothing else.
+    #[test]
+    fn rows_below_the_floor_have_no_grains() {
+        let deep = Cells {
+            counts: [5, 7],
+            below: 3,
+            ..CELLS
+        };
+        for (x, z) in [(0.3, 0.4), (1.25, 0.75), (2.1, 1.7), (0.4, -0.1)] {
+            for (own, level) in deep.hats(x, z).into_iter().zip(CELLS.hats(x, z)) {
+                assert_eq!(own.0, level.0 + 15);
+                assert!((own.1 - level.1).abs() < 1e-14);
+            }
+        }
+        assert_eq!(deep.height(3), CELLS.height(0));
+    }
 
     #[test]
     fn hats_add_up_to_one_and_interpolate_linearly_inside() {

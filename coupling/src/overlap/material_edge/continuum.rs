@@ -9,8 +9,8 @@ use super::account::{Account, Monitors};
 use super::cells::Cells;
 use super::copy::ROUNDED;
 use super::side::{Side, mirror_rows};
-use super::{MaterialEdge, MaterialEdgeSpec, NEARLY, OverlapError, layout, start};
-use colluvium_continuum::column_collapse::Collapse;
+use super::{MaterialEdge, MaterialEdgeSpec, NEARLY, OverlapError, floor, layout, start};
+use colluvium_continuum::column_collapse::{Collapse, CollapseGround};
 use colluvium_continuum::free_surface::SurfaceState;
 use colluvium_dem::GrainSample;
 use std::ops::Range;
@@ -26,13 +26,15 @@ pub struct Continuum {
     /// Which edges of its zone are its own, and which of those is the keeper.
     pub(super) edges: Range<usize>,
     pub(super) keeper: usize,
+    /// From which place on the ground below it is level (m); all of it without ground.
+    pub(super) level: f64,
 }
 
 impl Continuum {
     /// Of grains that lie where it will be, seen along its keeper's axis.
     pub(super) fn of_grains<'a>(
         specs: &[MaterialEdgeSpec],
-        edges: Range<usize>,
+        (edges, ground): (Range<usize>, Option<&CollapseGround>),
         grains: impl Iterator<Item = &'a GrainSample>,
         timestep: f64,
     ) -> Result<Self, OverlapError> {
@@ -51,13 +53,13 @@ impl Continuum {
                 before += grain.mass;
             }
         }
-        Self::standing(specs, edges, [before, behind], timestep)
+        Self::standing(specs, (edges, ground), [before, behind], timestep)
     }
 
-    /// Of a mass, and another that rests behind it (kg), before anything moves.
+    /// Of a mass, and another that rests behind it (kg), before anything moves. Over ground if it has the front.
     pub(super) fn standing(
         specs: &[MaterialEdgeSpec],
-        edges: Range<usize>,
+        (edges, ground): (Range<usize>, Option<&CollapseGround>),
         [mass, rest_mass]: [f64; 2],
         timestep: f64,
     ) -> Result<Self, OverlapError> {
@@ -73,11 +75,14 @@ impl Continuum {
         if exchange < NEARLY * options.largest_step {
             options.largest_step = options.largest_step.max(ROUNDED * exchange);
         }
-        let collapse = start::column(&spec, &column, &options)?;
+        let ground = ground.filter(|_| floor::has_front(&specs[edges.clone()]));
+        let collapse = start::column(&spec, &column, &options, ground)?;
         let axes = collapse.flow().grid().axes();
+        let below = -collapse.origin()[1] / collapse.spacing();
         let cells = Cells {
             counts: [axes[0].cells(), axes[1].cells()],
             low: spec.wall,
+            below: below.round().max(0.0) as usize,
             spacing: spec.spacing(),
             slab: spec.slab,
         };
@@ -88,6 +93,7 @@ impl Continuum {
             mass,
             rest_mass,
             keeper: keeper - edges.start,
+            level: ground.map_or(f64::NEG_INFINITY, |ground| floor::level_from(ground, &spec)),
             edges,
         })
     }
@@ -100,6 +106,11 @@ impl Continuum {
     /// Its grid.
     pub fn cells(&self) -> &Cells {
         &self.cells
+    }
+
+    /// Whether it runs over ground of its own.
+    pub fn has_ground(&self) -> bool {
+        !self.collapse.ground_outline().is_empty()
     }
 
     /// What its keeper was made from.

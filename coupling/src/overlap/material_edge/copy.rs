@@ -49,7 +49,11 @@ impl MaterialEdge {
                     inside = over(cover.copied, cover.mass);
                 }
                 if is_copy(cell) {
-                    state.fractions[cell] = (height - k as f64).clamp(0.0, 1.0) * inside;
+                    let level = k as f64 - self.cells.below as f64;
+                    state.fractions[cell] = match k < self.cells.below {
+                        true => 0.0,
+                        false => (height - level).clamp(0.0, 1.0) * inside,
+                    };
                 }
             }
         }
@@ -61,8 +65,9 @@ impl MaterialEdge {
             };
             for (face, u) in state.velocity[axis].iter_mut().enumerate() {
                 let (i, k) = (face % width, face / width);
-                // Faces on the edges of the grid are walls.
-                if [i, k][axis] == 0 || [i, k][axis] == self.cells.counts[axis] {
+                // Faces on the edges of the grid are walls, and so is the ground below the grains.
+                let first = [0, self.cells.below][axis];
+                if [i, k][axis] <= first || [i, k][axis] == self.cells.counts[axis] {
                     continue;
                 }
                 let high = i + columns * k;

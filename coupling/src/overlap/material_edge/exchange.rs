@@ -215,7 +215,7 @@ impl MaterialEdge {
         let arm = 4.0 * self.cells.spacing;
         for (cell, given) in self.given.spin.iter().enumerate() {
             let (i, k) = (cell % columns, cell / columns);
-            let is_inside = i > 0 && i + 1 < columns && k > 0 && k + 1 < rows;
+            let is_inside = i > 0 && i + 1 < columns && k > self.cells.below && k + 1 < rows;
             if *given == 0.0 || !is_inside {
                 continue;
             }

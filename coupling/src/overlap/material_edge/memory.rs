@@ -9,6 +9,7 @@ use super::travel::{Journey, Move};
 use super::{
     Continuum, GrainZone, MaterialEdge, MaterialEdgeSpec, OverlapError, continuum, layout,
 };
+use colluvium_continuum::column_collapse::CollapseGround;
 use colluvium_continuum::strain::SPACE_COMPONENTS;
 use colluvium_dem::{Patch, Simulation};
 use std::ops::Range;
@@ -66,6 +67,8 @@ impl MaterialEdge {
             journey.resting,
             journey.returns,
             journey.refused,
+            journey.stopped[0],
+            journey.stopped[1],
             journey.displaced,
             journey.strips.len() as f64,
         ]);
@@ -93,7 +96,8 @@ impl MaterialEdge {
         (specs, k): (&[MaterialEdgeSpec], usize),
         ours: [f64; 2],
         memory: &[f64],
-        (own, known): (Range<usize>, &mut Option<Continuum>),
+        (own, ground): (Range<usize>, Option<&CollapseGround>),
+        known: &mut Option<Continuum>,
         simulation: &Simulation,
     ) -> Result<Option<Self>, OverlapError> {
         let cells = memory.first().map_or(0, |cells| *cells as usize);
@@ -121,7 +125,7 @@ impl MaterialEdge {
             Some(continuum) => continuum,
             None => known.insert(Continuum::standing(
                 specs,
-                own,
+                (own, ground),
                 [mass, rest_mass],
                 simulation.timestep(),
             )?),
@@ -130,7 +134,19 @@ impl MaterialEdge {
         let Some(base) = take() else {
             return Ok(None);
         };
-        let Some(&[at, resting, returns, refused, displaced, strips]) = take() else {
+        let Some(
+            &[
+                at,
+                resting,
+                returns,
+                refused,
+                stopped,
+                first,
+                displaced,
+                strips,
+            ],
+        ) = take()
+        else {
             return Ok(None);
         };
         let Some(moves) = take() else {
@@ -155,6 +171,7 @@ impl MaterialEdge {
             resting,
             returns,
             refused,
+            stopped: [stopped, first],
             displaced,
         };
         let Some([stress, accelerations, spins, edge_rows, handshake, owed]) =
@@ -250,13 +267,14 @@ impl GrainZone {
         }
     }
 
-    /// Goes on from what was written of a zone with the same specification; the simulation is the one that was
+    /// Goes on from what was written of a zone with the same specification and ground; the simulation is the one that was
     /// joined, resumed itself.
     ///
     /// # Errors
     /// If the numbers do not belong to this specification.
     pub fn read(
         specs: &[MaterialEdgeSpec],
+        ground: Option<&CollapseGround>,
         memory: &[f64],
         simulation: &Simulation,
     ) -> Result<Self, OverlapError> {
@@ -283,9 +301,10 @@ impl GrainZone {
             order.sort_by_key(|k| *k != keeper);
             let mut edges = Vec::new();
             for k in order {
-                let known = (own.clone(), &mut continuum);
-                let memory = memories[k];
-                let edge = MaterialEdge::read_back((specs, k), ours[k], memory, known, simulation)?;
+                let (place, known) = ((own.clone(), ground), &mut continuum);
+                let (from, memory) = ((specs, k), memories[k]);
+                let edge =
+                    MaterialEdge::read_back(from, ours[k], memory, place, known, simulation)?;
                 edges.push((k, edge.ok_or_else(damaged)?));
             }
             edges.sort_by_key(|(k, _)| *k);

@@ -29,6 +29,7 @@ mod continuum;
 mod copy;
 mod embedded;
 mod exchange;
+mod floor;
 mod labels;
 mod layout;
 mod memory;
@@ -107,15 +108,25 @@ impl MaterialEdgeSpec {
         self.case.rheology.bulk_density()
     }
 
+    /// tan of the angle by which the face of its continuum leans out, away from the grains.
+    fn lean(&self) -> f64 {
+        self.case.overhang_degrees.to_radians().tan()
+    }
+
     /// Spacing of the grid (m).
     pub fn spacing(&self) -> f64 {
         self.case.length_scaled * self.case.height / self.case.cells as f64
     }
 
-    /// The column of the continuum that has a mass (kg), from where it begins to x_a.
+    /// The column of the continuum that has a mass (kg), from where it begins, or the foot of a face that leans out, to x_a.
     fn column(&self, mass: f64) -> CollapseCase {
         let width = self.place + self.zones()[1] - self.back;
-        let height = mass / (self.density() * self.slab * width);
+        let area = mass / (self.density() * self.slab);
+        let height = match self.lean() {
+            0.0 => mass / (self.density() * self.slab * width),
+            // Of width h + lean h^2/2 = area, without a difference of near numbers.
+            lean => 2.0 * area / (width + (width * width + 2.0 * lean * area).sqrt()),
+        };
         let spared = (self.wall / self.spacing()).floor().max(0.0) as usize;
         let cells = self.case.cells.saturating_sub(spared).max(1);
         CollapseCase {
@@ -179,6 +190,8 @@ pub struct MaterialEdge {
     cells: Cells,
     /// Between which places its grains lie at the start (m).
     ours: [f64; 2],
+    /// From which place on the ground below them is level (m).
+    level: f64,
     labels: Labels,
     journey: Journey,
     sums: Sums,
@@ -269,6 +282,7 @@ impl MaterialEdge {
         Self {
             cells,
             ours,
+            level: continuum.level,
             labels: Labels {
                 given: labels,
                 base: vec![spec.place; cells.counts[1]],

@@ -73,7 +73,7 @@ fn joined(rate: f64, drift: [f64; 2], ours: f64) -> (GrainZone, Simulation) {
         settings: settings.resolve(&scales, false).unwrap(),
         travel: None,
     };
-    let mut zone = GrainZone::cut(&[spec], &mut simulation).unwrap();
+    let mut zone = GrainZone::cut(&[spec], None, &mut simulation).unwrap();
     let (edge, continuum) = (&mut zone.edges[0], &mut zone.continua[0]);
     let centre = [EDGE, 0.5 * HEIGHT];
     let turn = |rate: f64, x: f64, z: f64| {

@@ -133,6 +133,7 @@ mod tests {
         let cells = Cells {
             counts: [4, 6],
             low: 0.0,
+            below: 0,
             spacing: 0.5,
             slab: 1.0,
         };

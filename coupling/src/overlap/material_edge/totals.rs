@@ -28,7 +28,8 @@ impl Continuum {
         let turned = |mut cell: CellFields| {
             cell.lower[0] += low;
             cell.upper[0] += low;
-            let row = (cell.lower[1] / self.cells.spacing).round() as usize;
+            let row = cell.lower[1] / self.cells.spacing + self.cells.below as f64;
+            let row = row.round() as usize;
             let middle = 0.5 * (cell.lower[0] + cell.upper[0]);
             let counted = counted.get(row);
             let counted = counted.is_none_or(|[begin, end]| middle >= *begin && middle < *end);
@@ -43,7 +44,23 @@ impl Continuum {
         self.collapse.fields().into_iter().map(turned).collect()
     }
 
-    /// Height, copies included, over each column of cells, and their places along x (m).
+    /// The ground under each column of its cells along x and z (m), if it runs over ground.
+    pub fn ground_outline(&self) -> Vec<[[f64; 2]; 4]> {
+        let side = self.spec.side;
+        let turned = |[x, z]: [f64; 2]| side.in_plane([x + self.spec.wall, z]);
+        let pieces = self.collapse.ground_outline().into_iter();
+        let mut pieces: Vec<[[f64; 2]; 4]> = pieces.map(|piece| piece.map(turned)).collect();
+        if side == Side::Above {
+            // Corners go round the same way.
+            for [a, b, c, d] in &mut pieces {
+                std::mem::swap(a, b);
+                std::mem::swap(c, d);
+            }
+        }
+        pieces
+    }
+
+    /// Depth of matter, copies included, over each column of cells, and their places along x (m).
     pub fn heights(&self) -> (Vec<f64>, Vec<f64>) {
         let (mut places, heights) = self.collapse.profile();
         for place in &mut places {
@@ -205,8 +222,8 @@ impl GrainZone {
     pub fn grains_height(&self, x: f64) -> f64 {
         let before = |edge: &MaterialEdge| {
             let at = edge.spec.side.along(x);
-            let rows = edge.held.handshake.iter().filter(|place| **place < at);
-            rows.count() as f64 * edge.cells.spacing
+            let rows = edge.held.handshake.iter().skip(edge.cells.below);
+            rows.filter(|place| **place < at).count() as f64 * edge.cells.spacing
         };
         // Intervals of grains, one after the other, end at an edge above which continuum lies.
         let (mut most, mut own) = (0.0_f64, f64::INFINITY);

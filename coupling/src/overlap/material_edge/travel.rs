@@ -12,7 +12,7 @@
 //!
 //! A move gives all labels anew, by where grains are: what has mixed since they were given is cut along a clean edge.
 //! Each return doubles the rest that the next move outwards waits for: the two thresholds and this keep the edge from
-//! going to and fro. A move inwards that a budget of grains does not allow is refused and counted. Mass changes hands
+//! going to and fro. A move inwards that a budget of grains does not allow is refused and counted, and so is one to where the ground is not level. Mass changes hands
 //! at the edge alone, by whole strips; momentum that goes with it is booked. Every move is kept with its reason
 //! ([`Move`]).
 
@@ -104,9 +104,11 @@ pub(super) struct Journey {
     pub moves: Vec<Move>,
     /// Exchanges for which the grains beside the edge have rested.
     pub resting: f64,
-    /// Moves inwards so far, and those refused.
+    /// Moves inwards so far, those that a budget refused, and those for which the ground was not level.
     pub returns: f64,
     pub refused: f64,
+    /// How many, and when the first (s).
+    pub stopped: [f64; 2],
     /// Grains that were laid on top because their place was taken.
     pub displaced: f64,
 }
@@ -316,6 +318,9 @@ impl MaterialEdge {
         reason: (Reason, f64),
         simulation: &mut Simulation,
     ) -> Result<bool, OverlapError> {
+        if !self.has_level_ground_for(travel, simulation.time()) {
+            return Ok(false);
+        }
         let strips = &self.journey.strips;
         let more = strips.last().map_or(0, |patch| patch.grains.len());
         if (simulation.grain_count() + more) as f64 > travel.budget {

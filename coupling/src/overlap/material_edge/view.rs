@@ -29,7 +29,6 @@ impl View {
     /// Looks at a collapse, along its axis or against it.
     pub fn look(&mut self, collapse: &Collapse, cells: &Cells, as_seen: Side) {
         let (state, units) = (collapse.flow().state(), collapse.units());
-        let points = state.stress.len() / state.fractions.len();
         let (columns, stress) = (cells.counts[0], units.stress());
         self.fraction.clone_from(&state.fractions);
         self.pressure.clear();
@@ -44,10 +43,9 @@ impl View {
             let up = state.velocity[1][cell] + state.velocity[1][cell + columns];
             self.velocity
                 .push([across, up].map(|sum| 0.5 * sum * units.velocity));
-            let own = &state.stress[cell * points..(cell + 1) * points];
-            self.stress.push(
-                [0, 1].map(|c| own.iter().map(|s| s[c]).sum::<f64>() / points as f64 * stress),
-            );
+            let own = collapse.flow().stresses_in(cell);
+            let mean = |c: usize| own.iter().map(|s| s[c]).sum::<f64>() / own.len() as f64;
+            self.stress.push([0, 1].map(|c| mean(c) * stress));
         }
         if as_seen == Side::Above {
             mirror_rows(&mut self.fraction, columns);

@@ -63,7 +63,7 @@ impl Through {
 
 /// Whether a grain lies in front of a surface at these places row by row (m).
 pub(super) fn is_before(grain: &GrainSample, cells: &Cells, places: &[f64]) -> bool {
-    let row = (grain.position.z / cells.spacing).max(0.0) as usize;
+    let row = (grain.position.z / cells.spacing).max(0.0) as usize + cells.below;
     grain.position.x >= places[row.min(places.len() - 1)]
 }
 
@@ -102,6 +102,7 @@ impl Witness {
                 (TALL * spec.case.height / h).ceil() as usize + 1,
             ],
             low: spec.wall.min(0.0),
+            below: 0,
             spacing: h,
             slab: spec.slab,
         };

@@ -7,9 +7,12 @@
 //! surfaces of all their edges, and of edges that want to move the lower one goes first. A grain that two edges act on bears
 //! the sum.
 
-use super::{Account, Continuum, MaterialEdge, MaterialEdgeSpec, OverlapError, Side, layout};
+use super::{
+    Account, Continuum, MaterialEdge, MaterialEdgeSpec, OverlapError, Side, floor, layout, start,
+};
 use crate::overlap::angular::AngularBook;
 use crate::overlap::sighting::{Sighting, free_mass};
+use colluvium_continuum::column_collapse::CollapseGround;
 use colluvium_dem::{Load, Simulation};
 
 /// Diameters of grains between two overlaps that moves leave.
@@ -28,13 +31,33 @@ pub struct GrainZone {
 }
 
 impl GrainZone {
-    /// Cuts a column of grains at its edges, along x: what lies behind them becomes continuum.
+    /// Whether a continuum that has the front can stand and run out over ground.
+    ///
+    /// # Errors
+    /// Ground that is not level below column and overlap, or does not fit its grid.
+    pub fn check_ground(
+        specs: &[MaterialEdgeSpec],
+        ground: &CollapseGround,
+    ) -> Result<(), OverlapError> {
+        let continua = layout::continua(specs).into_iter();
+        for own in continua.filter(|own| floor::has_front(&specs[own.clone()])) {
+            let spec = &specs[own.start];
+            let width = spec.place + spec.zones()[1] - spec.back;
+            let mass = spec.density() * spec.slab * width * spec.case.height;
+            start::column(spec, &spec.column(mass), &spec.options, Some(ground))?;
+        }
+        Ok(())
+    }
+
+    /// Cuts a column of grains at its edges, along x: what lies behind them becomes continuum, which runs over the ground
+    /// if it has the front.
     ///
     /// # Errors
     /// Settings out of range, edges that leave no grains between their overlaps or no continuum between them, no grains on a side,
-    /// or a continuum that cannot stand.
+    /// ground that is not level below an overlap, or a continuum that cannot stand.
     pub fn cut(
         specs: &[MaterialEdgeSpec],
+        ground: Option<&CollapseGround>,
         simulation: &mut Simulation,
     ) -> Result<Self, OverlapError> {
         layout::check(specs)?;
@@ -46,7 +69,8 @@ impl GrainZone {
             let mut seen = Sighting::default();
             seen.look_along(specs[keeper].side, simulation);
             let free = seen.snapshot.grains.iter().filter(|g| !g.fixed);
-            let continuum = Continuum::of_grains(specs, own.clone(), free, simulation.timestep())?;
+            let place = (own.clone(), ground);
+            let continuum = Continuum::of_grains(specs, place, free, simulation.timestep())?;
             for k in own {
                 let mut seen = Sighting::default();
                 seen.look_along(specs[k].side, simulation);

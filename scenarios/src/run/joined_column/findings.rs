@@ -33,7 +33,11 @@ impl JoinedColumn<'_> {
         let left_out = scene.continua().into_iter().map(|[low, high]| {
             let ends = [scene.width(), scene.length()];
             let [column, ground] = ends.map(|end| high.unwrap_or(end) - low.unwrap_or(0.0));
-            per_area * scene.height * column + floor * ground
+            let lip = match high {
+                None => scene.section(scene.height) - scene.height * scene.width(),
+                Some(_) => 0.0,
+            };
+            per_area * (scene.height * column + lip) + floor * ground
         });
         (all - left_out.sum::<f64>()) / all
     }
@@ -96,6 +100,7 @@ impl JoinedColumn<'_> {
                 }
             ),
         ));
+        lines.extend(scene.terrain_in_words());
         lines
     }
 
@@ -104,6 +109,10 @@ impl JoinedColumn<'_> {
         let scene = self.scene;
         let d = scene.grains.diameter;
         let mut names = self.names().into_iter();
+        let over = match scene.terrain {
+            Some(_) => ", over the terrain",
+            None => "",
+        };
         let mut named = |place: f64| {
             let name = names.next().unwrap_or_default().replace('_', " ");
             format!("the {name} at {place:.4} m ({:.1} d)", place / d)
@@ -119,7 +128,7 @@ impl JoinedColumn<'_> {
             };
             match ends[1] {
                 Some(high) => format!("continuum from {from} to {}", named(high)),
-                None => format!("continuum from {from} on, with the column's front"),
+                None => format!("continuum from {from} on, with the column's front{over}"),
             }
         };
         let continua: Vec<String> = scene.continua().into_iter().map(of).collect();
@@ -328,7 +337,7 @@ impl JoinedColumn<'_> {
             (
                 "continuum_walls",
                 walls,
-                "that the continuum had from walls, floor and the stress on its surface: what is left of its momentum",
+                "that the continuum had from walls, floor or ground and the stress on its surface: what is left of its momentum",
             ),
         ] {
             for (axis, value) in [("x", x), ("z", z)] {
@@ -588,6 +597,14 @@ fn moves(zone: &GrainZone, summary: &mut Summary) -> Option<Table> {
         edges.iter().map(MaterialEdge::refused_moves).sum::<f64>(),
         edges.iter().map(MaterialEdge::displaced).sum::<f64>()
     ));
+    for edge in edges {
+        if let Some((times, first)) = edge.stopped_moves() {
+            summary.remarks.push(format!(
+                "{times} moves inwards of the edge that is now at {:.4} m, the first at t = {first:.4} s, were not made: the ground there is not level.",
+                edge.spec().side.along(edge.spec().place + edge.travelled())
+            ));
+        }
+    }
     let column = |f: fn(&Move) -> f64| all.iter().map(|(.., m)| f(m)).collect::<Vec<f64>>();
     let places = all.iter().map(|(_, place, _)| *place).collect();
     let sides = all.iter().map(|(side, ..)| *side as f64).collect();
