@@ -234,7 +234,7 @@ fn a_killed_front_over_a_slope_goes_on_in_the_middle_of_an_exchange() {
         &["duration_scaled=1.5", "output.frames=4"],
     ]
     .concat();
-    killed_and_whole(Some(&JOINED_COLUMN), ("column-collapse", &sets), 29, 2);
+    killed_and_whole(None, ("column-collapse", &sets), 29, 2);
 }
 
 /// Before and after its debris has become a continuum.
