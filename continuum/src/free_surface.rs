@@ -9,6 +9,7 @@
 //! is a constant of its types. Ground that cuts cells, and walls beside it that
 //! it does not resolve, are known in a plane only.
 
+mod distances;
 mod faces;
 mod fields;
 mod flow;

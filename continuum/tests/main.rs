@@ -18,6 +18,7 @@ mod open_ends;
 mod open_ends_in_space;
 mod outside;
 mod sheared_layers;
+mod shores;
 mod space;
 mod steep_ground;
 mod terrain;

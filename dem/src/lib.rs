@@ -66,6 +66,7 @@ pub use domain::Domain;
 pub use energy::Energy;
 pub use grains::Grain;
 pub use gravity::{GRAVITATION, HeavySphere, Schedule, SelfGravity, TreeError};
+pub use lanes::Width;
 pub use ledger::{Bonding, Channels, EnergyLedger, Falling};
 pub use loads::Load;
 pub use patch::Patch;

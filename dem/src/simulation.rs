@@ -522,6 +522,17 @@ impl Simulation {
         self.rebuilds
     }
 
+    /// Lets steps use these registers instead of the widest: slower, and the same bits. False, and nothing is changed, where
+    /// the processor does not have them.
+    #[must_use]
+    pub fn set_width(&mut self, width: Width) -> bool {
+        let present = Width::present().any(|has| has == width);
+        if present {
+            self.width = width;
+        }
+        present
+    }
+
     /// Shares steps out over the current rayon pool, or not. The results are the same bits.
     pub fn set_threads(&mut self, threads: Threads) {
         let parallel = threads == Threads::Rayon;

@@ -20,12 +20,16 @@ fn allocations() -> u64 {
     (counts.allocations + counts.reallocations) as u64
 }
 
-fn flow(threads: Threads, floor: impl Fn(f64) -> Wall) -> Simulation {
-    let law = ContactLaw::linear(
+fn law() -> ContactLaw {
+    ContactLaw::linear(
         Hooke::matched(2e4, 0.5),
         TangentialSpring::matched(2.0 / 7.0, 0.5, 0.5),
         None,
-    );
+    )
+}
+
+/// Grains at rest, for all flows.
+fn settled() -> Bed {
     let spec = InclineBed {
         grains: 1500,
         radius: RadiusLaw::Gaussian {
@@ -36,19 +40,21 @@ fn flow(threads: Threads, floor: impl Fn(f64) -> Wall) -> Simulation {
         density: 6.0 / std::f64::consts::PI,
         length: 12.0,
         width: 10.0,
-        law,
+        law: law(),
         gravity: 1.0,
         timestep: 5e-4,
         seed: 5,
     };
-    let bed: Bed =
-        settle_incline_bed(&spec, Threads::Serial, &mut |_| ControlFlow::Continue(())).unwrap();
+    settle_incline_bed(&spec, Threads::Serial, &mut |_| ControlFlow::Continue(())).unwrap()
+}
+
+fn flow(bed: &Bed, threads: Threads, floor: impl Fn(f64) -> Wall) -> Simulation {
     let slope = 33_f64.to_radians();
     let mut s = Simulation::new(Setup {
         domain: bed.domain,
         gravity: Vector3::new(slope.sin(), 0.0, -slope.cos()),
-        law: law.into(),
-        grains: bed.grains,
+        law: law().into(),
+        grains: bed.grains.clone(),
         walls: vec![floor(bed.domain.lower.z)],
         bodies: Vec::new(),
         timestep: 5e-4,
@@ -105,9 +111,10 @@ fn count(s: &mut Simulation) -> (u64, u64, u64) {
 
 #[test]
 fn steps_allocate_nothing() {
-    let (quiet, busy, builds) = count(&mut flow(Threads::Serial, plane));
+    let bed = settled();
+    let (quiet, busy, builds) = count(&mut flow(&bed, Threads::Serial, plane));
     println!("serial: {quiet} a step, {busy} over {builds} rebuilds");
-    let mut parallel = flow(Threads::Rayon, plane);
+    let mut parallel = flow(&bed, Threads::Rayon, plane);
     let (quiet_threads, busy_threads, _) = rayon::ThreadPoolBuilder::new()
         .num_threads(2)
         .build()
@@ -120,7 +127,7 @@ fn steps_allocate_nothing() {
     assert!(busy < 2 * builds, "{busy}");
     assert!(busy_threads < 2 * builds, "{busy_threads}");
     // One test: the counter sees all threads of the process.
-    let (quiet, busy, builds) = count(&mut flow(Threads::Serial, mesh));
+    let (quiet, busy, builds) = count(&mut flow(&bed, Threads::Serial, mesh));
     println!("on a mesh: {quiet} a step, {busy} over {builds} rebuilds");
     assert_eq!(quiet, 0);
     assert!(busy < 2 * builds, "{busy}");

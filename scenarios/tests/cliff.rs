@@ -3,6 +3,7 @@
 use crate::command::{
     INSTALMENTS, SMALL_COMET_CLIFF, colluvium, hash, succeed, summary, table, value,
 };
+use crate::packings::{CLIFF_OF_GRAINS, COMET_CLIFF};
 
 fn run<'a>(out: &'a str, sets: &[&'a str]) -> Vec<&'a str> {
     let mut list = vec!["run", "cliff", "--out", out];
@@ -17,7 +18,8 @@ fn run<'a>(out: &'a str, sets: &[&'a str]) -> Vec<&'a str> {
 fn cliff_falls_along_its_crack() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
-    succeed(folder.path(), &run("c", &[]));
+    COMET_CLIFF.put(folder.path());
+    succeed(folder.path(), &run("c", &["output.frames=6"]));
     let found = summary(&at("c"));
     assert_eq!(found["status"], "done");
     let failure = value(&found, "time_of_failure");
@@ -63,7 +65,7 @@ fn cliff_falls_along_its_crack() {
         [None, Some(600.0), Some(3600.0), Some(6e-3), None]
     );
     // Negative control, from the same packing: no crack.
-    let whole = ["crack.depth_scaled=0", "duration=700"];
+    let whole = ["crack.depth_scaled=0", "duration=700", "output.frames=0"];
     succeed(folder.path(), &run("w", &whole));
     let stands = summary(&at("w"));
     assert_eq!(value(&stands, "stood"), 1.0);
@@ -77,7 +79,8 @@ fn cliff_falls_along_its_crack() {
 fn debris_runs_out_as_a_continuum() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
-    succeed(folder.path(), &run("c", &["output.frames=0"]));
+    COMET_CLIFF.put(folder.path());
+    CLIFF_OF_GRAINS.put(folder.path());
     // Its wedge stands: with the slope of the scene, as a whole, it stays grains, and the run is theirs.
     let whole = ["model=hybrid", "runout.least_share=1", "output.frames=0"];
     succeed(folder.path(), &run("g", &whole));
@@ -104,14 +107,6 @@ fn debris_runs_out_as_a_continuum() {
             [&grains, &joined, &control].map(|s| s["results"][name]["value"].as_f64())
         );
     }
-    // The same bits for another number of threads.
-    let threads = [
-        &run("t", &["model=hybrid", standing, "output.frames=0"])[..],
-        &["--threads", "2"],
-    ]
-    .concat();
-    succeed(folder.path(), &threads);
-    assert_eq!(hash(&at("t")), hash(&at("h")));
     for name in ["time_of_failure", "sunk_standing", "loosened_grains"] {
         assert_eq!(value(&grains, name), value(&joined, name), "{name}");
     }
@@ -142,12 +137,10 @@ fn debris_runs_out_as_a_continuum() {
 fn what_lies_changes_hands_before_what_stands() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
-    succeed(folder.path(), &run("c", &["output.frames=0"]));
+    COMET_CLIFF.put(folder.path());
+    CLIFF_OF_GRAINS.put(folder.path());
     let sets = [INSTALMENTS, &["output.frames=0"]].concat();
     succeed(folder.path(), &run("i", &sets));
-    let threads = [&run("t", &sets)[..], &["--threads", "2"]].concat();
-    succeed(folder.path(), &threads);
-    assert_eq!(hash(&at("t")), hash(&at("i")));
     let [grains, found] = ["c", "i"].map(|name| summary(&at(name)));
     println!("{}", found["results"]);
     let of = |name: &str| value(&found, name);

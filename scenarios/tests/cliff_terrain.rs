@@ -1,6 +1,7 @@
 //! Cliffs before which the ground is no plane.
 
 use crate::command::{SMALL_COMET_CLIFF, colluvium, hash, succeed, summary, table, value};
+use crate::packings::{CLIFF_OF_GRAINS, COMET_CLIFF};
 use std::path::Path;
 
 fn run<'a>(out: &'a str, sets: &[&'a str]) -> Vec<&'a str> {
@@ -21,15 +22,16 @@ fn debris_runs_down_into_a_valley() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     let level = "terrain.profile=[[0,0],[140,0]]";
+    COMET_CLIFF.put(folder.path());
+    CLIFF_OF_GRAINS.put(folder.path());
     for (out, sets) in [
-        ("plane", &[][..]),
-        ("level", &[level]),
-        ("grains", &[VALLEY]),
-        ("joined", &[VALLEY, "model=hybrid"]),
+        ("level", &[level, "output.frames=0"][..]),
+        ("grains", &[VALLEY, "output.frames=4"]),
+        ("joined", &[VALLEY, "model=hybrid", "output.frames=4"]),
     ] {
         succeed(folder.path(), &run(out, sets));
     }
-    let all = ["plane", "level", "grains", "joined"].map(|name| summary(&at(name)));
+    let all = ["c", "level", "grains", "joined"].map(|name| summary(&at(name)));
     for name in [
         "time_of_failure",
         "x_front",
@@ -86,7 +88,13 @@ fn ground_comes_from_points_a_raster_or_a_mesh() {
     std::fs::write(at("valley.asc"), raster).unwrap();
     std::fs::write(at("valley.obj"), object(&heights)).unwrap();
     let points = "terrain.profile=[[-40,4],[0,3],[40,0],[80,-4],[120,-1],[160,-10],[200,-10]]";
-    let short = ["standing=100", "duration=50", "output.pictures=0"];
+    let short = [
+        "standing=100",
+        "duration=50",
+        "output.pictures=0",
+        "output.frames=0",
+    ];
+    COMET_CLIFF.put(folder.path());
     let sources = [
         ("points", vec![points]),
         (

@@ -1,25 +1,9 @@
 //! A ball that falls into grains with a continuum around them, from the command line.
 
-use crate::command::{colluvium, hash, pause, succeed, summary, table, value};
+use crate::command::{BED, colluvium, hash, pause, succeed, summary, table, value};
+use crate::packings::{BED_OF_GRAINS, SETTLED_BED};
 use std::path::Path;
 use std::process::{Command, Stdio};
-
-/// A bed of 3 800 soft grains, 17 diameters wide and 12 deep.
-const BED: [&str; 13] = [
-    "scale=1",
-    "speed=2",
-    "duration=0.02",
-    "ball.radius=0.0025",
-    "ball.height=0.004",
-    "container.length=0.034",
-    "container.width=0.034",
-    "container.floor=-0.026",
-    "container.grains=3800",
-    "contact.youngs_modulus=1e7",
-    "surfaces.steel.contact.youngs_modulus=1e8",
-    "output.pictures=0",
-    "packing=bed",
-];
 
 /// Grains in a box half as large, in an overlap of four diameters.
 const BOWL: [&str; 7] = [
@@ -60,7 +44,8 @@ fn apart(folder: &Path, names: [&str; 2]) -> f64 {
 fn a_ball_sinks_into_a_joined_bed_as_into_grains() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
-    succeed(folder.path(), &arguments("grains", &[]));
+    SETTLED_BED.put(folder.path());
+    BED_OF_GRAINS.put(folder.path());
     for (name, threads) in [("joined", "1"), ("two", "2")] {
         let mut run = joined(name, &["output.frames=3"]);
         run.extend(["--threads", threads]);
@@ -114,7 +99,8 @@ fn a_ball_sinks_into_a_joined_bed_as_into_grains() {
 #[test]
 fn a_box_may_reach_the_walls() {
     let folder = tempfile::tempdir().unwrap();
-    succeed(folder.path(), &arguments("grains", &[]));
+    SETTLED_BED.put(folder.path());
+    BED_OF_GRAINS.put(folder.path());
     let corner = ["zones.x=[-0.017,0.0125]", "zones.y=[-0.0125,1]"];
     let level = ["zones.x=[-0.017,0.017]", "zones.y=[-1,1]"];
     let deep = "zones.depth=0.016";
@@ -156,6 +142,7 @@ const SHEARED: [&str; 6] = [
 #[test]
 fn a_joined_bed_goes_on_after_a_kill() {
     let folder = tempfile::tempdir().unwrap();
+    SETTLED_BED.put(folder.path());
     let mut whole = joined("whole", &SHEARED);
     whole.extend(["--threads", "2"]);
     succeed(folder.path(), &whole);
@@ -206,6 +193,7 @@ fn a_joined_bed_goes_on_after_a_kill() {
 fn a_ball_that_comes_to_the_overlap_ends_the_run_or_lets_the_box_grow() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
+    SETTLED_BED.put(folder.path());
     let fast = ["speed=4", "duration=0.012"];
     succeed(folder.path(), &arguments("grains", &fast));
     succeed(folder.path(), &joined("fixed", &fast));

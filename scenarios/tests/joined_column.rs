@@ -3,6 +3,7 @@
 use crate::command::{
     MOVING_EDGE, SMALL_JOINED_COLUMN, colluvium, hash, succeed, summary, table, value,
 };
+use crate::packings::JOINED_COLUMN;
 use colluvium_coupling::overlap::Reason;
 use std::path::Path;
 
@@ -34,6 +35,8 @@ fn area(folder: &Path, file: &str) -> f64 {
 fn a_joined_column_collapses_as_its_grains_do() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
+    JOINED_COLUMN.put(folder.path());
+    JOINED_COLUMN.put(folder.path());
     let [dem, none] = [["model=dem"], ["overlap.uncoupled=true"]];
     succeed(folder.path(), &arguments("grains", &dem));
     let mut one = arguments("joined", &[]);
@@ -138,6 +141,8 @@ fn a_joined_column_collapses_as_its_grains_do() {
 #[test]
 fn an_edge_that_moves_hands_grains_over_and_keeps_its_books() {
     let folder = tempfile::tempdir().unwrap();
+    JOINED_COLUMN.put(folder.path());
+    JOINED_COLUMN.put(folder.path());
     for threads in ["1", "2"] {
         let mut run = arguments(threads, MOVING_EDGE);
         run.extend(["--threads", threads]);
@@ -303,6 +308,8 @@ fn a_width_of_the_overlap_varies_with_the_tolerance() {
     );
     assert!(planned(&[]).starts_with("overlap.width 0.6000 m, of which shell 2.0 d, buffer 3.0 d"));
 
+    JOINED_COLUMN.put(folder.path());
+    JOINED_COLUMN.put(folder.path());
     let mut arguments = arguments("p", &["duration_scaled=0.5"]);
     arguments[0] = "pareto";
     arguments.extend([

@@ -3,6 +3,7 @@
 use crate::command::{
     CORE, INTERVAL, SMALL_JOINED_COLUMN, colluvium, hash, succeed, summary, table, value,
 };
+use crate::packings::WIDE_COLUMN;
 
 fn arguments<'a>(command: &'a str, out: &'a str, more: &[&'a str]) -> Vec<&'a str> {
     arguments_of(INTERVAL, command, out, more)
@@ -43,6 +44,7 @@ fn collapse(zones: &[&str], worse: f64) {
     let arguments = |command, out, more: &[&'static str]| arguments_of(zones, command, out, more);
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
+    WIDE_COLUMN.put(folder.path());
     for (name, sets) in [
         ("grains", &["model=dem"][..]),
         ("joined", &["output.frames=3"]),
@@ -108,6 +110,7 @@ fn ends_as_grains(joined: &serde_json::Value, grains: &serde_json::Value) {
 #[test]
 fn a_list_of_intervals_has_continua_between_them() {
     let folder = tempfile::tempdir().unwrap();
+    WIDE_COLUMN.put(folder.path());
     let zones = ["zones.x=[[0, 1], [1.5, 3.1]]", "duration_scaled=1"];
     succeed(folder.path(), &arguments_of(CORE, "run", "x", &zones));
     let found = summary(&folder.path().join("x"));
@@ -127,6 +130,7 @@ fn a_list_of_intervals_has_continua_between_them() {
 #[test]
 fn an_interval_up_to_the_front_is_one_edge() {
     let folder = tempfile::tempdir().unwrap();
+    WIDE_COLUMN.put(folder.path());
     for (name, sets) in [
         ("one", &["zones.x=[1.5, 99.0]", "duration_scaled=0.5"][..]),
         ("given", &["zones.edge_scaled=1.5", "duration_scaled=0.5"]),

@@ -25,6 +25,7 @@ mod killed;
 mod malformed;
 mod open_chute;
 mod own_scenes;
+mod packings;
 mod restart;
 mod scenes;
 mod sheared;

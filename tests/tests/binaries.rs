@@ -1,5 +1,5 @@
 //! Every file of tests belongs to a binary: the crates name theirs themselves (`autotests = false`), so a file that
-//! neither a module nor a manifest names would never run.
+//! neither a module nor a manifest names would never run. Nor would a test or an example where a manifest says that there is none.
 
 use std::fs::read_to_string;
 use std::path::{Path, PathBuf};
@@ -39,6 +39,95 @@ fn strays(package: &Path) -> Vec<PathBuf> {
         }
     }
     strays
+}
+
+/// Rust files below a folder.
+fn sources(folder: &Path) -> Vec<PathBuf> {
+    let entries = std::fs::read_dir(folder).unwrap();
+    let paths = entries.map(|entry| entry.unwrap().path());
+    let deep = paths.flat_map(|path| match path.is_dir() {
+        true => sources(&path),
+        false => vec![path],
+    });
+    deep.filter(|path| path.extension().is_some_and(|end| end == "rs"))
+        .collect()
+}
+
+/// Whether documentation has an example that could be run.
+fn has_example(source: &str) -> bool {
+    let mut open = false;
+    for line in source.lines().map(str::trim_start) {
+        let text = line.strip_prefix("///").or(line.strip_prefix("//!"));
+        let Some(words) = text.and_then(|text| text.trim().strip_prefix("```")) else {
+            continue;
+        };
+        open = !open;
+        if open
+            && words
+                .split(',')
+                .all(|word| !["text", "toml", "sh"].contains(&word))
+        {
+            return true;
+        }
+    }
+    false
+}
+
+/// Sources with tests or examples that the manifest of their crate keeps from being run.
+fn unseen(package: &Path) -> Vec<PathBuf> {
+    let manifest = read_to_string(package.join("Cargo.toml")).unwrap();
+    let without = |key: &str| manifest.lines().any(|line| line == key);
+    let mut unseen = Vec::new();
+    for path in sources(&package.join("src")) {
+        let source = read_to_string(&path).unwrap();
+        let own = path.strip_prefix(package.join("src")).unwrap();
+        let a_binary = own == "main.rs" || own.starts_with("bin");
+        let test = a_binary && without("test = false") && source.contains("#[test]");
+        if test || without("doctest = false") && has_example(&source) {
+            unseen.push(path);
+        }
+    }
+    unseen
+}
+
+#[test]
+fn what_a_manifest_leaves_out_has_no_tests_and_no_examples() {
+    let workspace = Path::new(env!("CARGO_MANIFEST_DIR")).parent().unwrap();
+    for package in [
+        "dem",
+        "continuum",
+        "coupling",
+        "scenarios",
+        "tests",
+        "benchmarks",
+    ] {
+        assert_eq!(unseen(&workspace.join(package)), Vec::<PathBuf>::new());
+    }
+}
+
+#[test]
+fn a_test_or_an_example_that_is_left_out_is_found() {
+    let package = tempfile::tempdir().unwrap();
+    let at = |name: &str| package.path().join(name);
+    std::fs::create_dir_all(at("src/bin")).unwrap();
+    let manifest = |text: &str| std::fs::write(at("Cargo.toml"), text).unwrap();
+    let example = "//! ```text\n//! a = b\n//! ```\n/// ```\n/// f();\n/// ```\nfn f() {}\n";
+    for (name, text) in [
+        ("lib.rs", example),
+        (
+            "other.rs",
+            "//! ```text\n//! a\n//! ```\n#[test]\nfn g() {}\n",
+        ),
+        ("bin/tool.rs", "#[test]\nfn h() {}\n"),
+    ] {
+        std::fs::write(at("src").join(name), text).unwrap();
+    }
+    manifest("[lib]\n[[bin]]\n");
+    assert!(unseen(package.path()).is_empty());
+    manifest("[lib]\ndoctest = false\n[[bin]]\ntest = false\n");
+    let mut found = unseen(package.path());
+    found.sort();
+    assert_eq!(found, [at("src/bin/tool.rs"), at("src/lib.rs")]);
 }
 
 #[test]

@@ -15,6 +15,7 @@ pub use state::{SpaceFields, SpaceState, Spent, SurfaceOptions, SurfaceState, Su
 
 use super::faces::ACTIVE;
 use super::ground::Ground;
+use super::ground::shores::Shores;
 use super::open_ends::OpenEnds;
 use super::operators::points_of;
 use super::outside::Outside;
@@ -58,6 +59,7 @@ pub struct SurfaceFlow<
     state: SurfaceState<D, C>,
     saved: SurfaceState<D, C>,
     planes: Vec<Option<Plane>>,
+    shores: Shores,
     transport: Transport<D>,
     /// The velocity that carries material in a step.
     carrier: Velocity<D>,

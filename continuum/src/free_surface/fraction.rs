@@ -9,7 +9,7 @@ use super::plane::Plane;
 use super::topology::{NONE, Topology};
 
 /// Most cells of a neighbourhood, the cell itself in the middle.
-const STENCIL: usize = 27;
+pub(super) const STENCIL: usize = 27;
 /// Cells fuller than this count as full.
 pub(crate) const FULL: f64 = 1.0 - 1e-12;
 
@@ -23,7 +23,7 @@ const ALIKE: f64 = 1e-4;
 /// Cells in space with less material are level: dust has no shape.
 const SHAPELESS: f64 = 1e-10;
 /// The square of round-off.
-const EXACT: f64 = 1e-24;
+pub(super) const EXACT: f64 = 1e-24;
 
 /// Cells of the neighbourhood with so many axes.
 const fn stencil(axes: usize) -> usize {
@@ -31,7 +31,7 @@ const fn stencil(axes: usize) -> usize {
 }
 
 /// Fractions around a cell. Beyond the edge of the grid stands the cell inside.
-struct Neighbourhood<'a, const D: usize> {
+pub(super) struct Neighbourhood<'a, const D: usize> {
     topology: &'a Topology<D>,
     all: &'a [f64],
     cells: [usize; STENCIL],
@@ -50,7 +50,7 @@ fn step(place: usize, axis: usize) -> usize {
 }
 
 impl<'a, const D: usize> Neighbourhood<'a, D> {
-    fn around(topology: &'a Topology<D>, fractions: &'a [f64], cell: usize) -> Self {
+    pub(super) fn around(topology: &'a Topology<D>, fractions: &'a [f64], cell: usize) -> Self {
         let mut found = Self {
             topology,
             all: fractions,
@@ -77,6 +77,33 @@ impl<'a, const D: usize> Neighbourhood<'a, D> {
             found.fractions[place] = fractions[at];
         }
         found
+    }
+
+    /// The cell in the middle.
+    pub(super) fn cell(&self) -> usize {
+        self.cells[(stencil(D) - 1) / 2]
+    }
+
+    /// Fraction of it.
+    pub(super) fn fraction(&self) -> f64 {
+        self.fractions[(stencil(D) - 1) / 2]
+    }
+
+    /// Whether it holds for some cell of the grid.
+    pub(super) fn any(&self, holds: impl Fn(usize) -> bool) -> bool {
+        self.places().any(|(cell, ..)| holds(cell))
+    }
+
+    /// The cells of the grid: each with its lower corner, seen from the one in the middle, and its fraction.
+    pub(super) fn places(&self) -> impl Iterator<Item = (usize, [f64; 3], f64)> + '_ {
+        let inside = (0..stencil(D)).filter(|&place| self.inside[place]);
+        inside.map(|place| {
+            let mut low = [0.0; 3];
+            for (axis, low) in low.iter_mut().enumerate().take(D) {
+                *low = step(place, axis) as f64 - 1.0;
+            }
+            (self.cells[place], low, self.fractions[place])
+        })
     }
 
     /// Amount of material by which the high side of an axis exceeds the low one. Nothing clings to a ceiling.
@@ -137,12 +164,8 @@ impl<'a, const D: usize> Neighbourhood<'a, D> {
     /// Sum of squares by which a plane misses the fractions of the neighbours; given up beyond `most`.
     fn miss(&self, plane: &Plane, most: f64) -> f64 {
         let mut sum = 0.0;
-        for place in (0..stencil(D)).filter(|&place| self.inside[place]) {
-            let mut low = [0.0; 3];
-            for (axis, low) in low.iter_mut().enumerate().take(D) {
-                *low = step(place, axis) as f64 - 1.0;
-            }
-            let miss = plane.volume_in(low, low.map(|x| x + 1.0)) - self.fractions[place];
+        for (_, low, fraction) in self.places() {
+            let miss = plane.volume_in(low, low.map(|x| x + 1.0)) - fraction;
             sum += miss * miss;
             if sum > most {
                 break;

@@ -27,12 +27,15 @@
 pub(crate) mod contact;
 mod cuts;
 pub(crate) mod faces;
+mod fitted_planes;
 mod foot;
 mod layers;
 mod operators;
 mod points;
 pub(crate) mod settling;
+pub(crate) mod shores;
 mod transport;
+mod volumes;
 
 use serde::{Deserialize, Serialize};
 

@@ -9,6 +9,7 @@
 
 use super::faces::{ACTIVE, ALIKE, Face, Faces, weight_onto};
 use super::fraction::volume_in;
+use super::ground::shores::Shores;
 use super::open_ends::OpenEnds;
 use super::outside::Outside;
 use super::plane::Plane;
@@ -22,8 +23,6 @@ use crate::linear_solver::Place;
 use crate::strain::{shear_row, stretching};
 use crate::wall_friction::{PointLaw, SideWalls};
 
-/// Smallest θ in the pressure gradient and in the pressure at walls.
-const NEAREST_SURFACE: f64 = 0.005;
 /// Smallest θ in the extrapolation of pressure beyond the surface.
 pub(super) const NEAREST_EXTRAPOLATION: f64 = 0.25;
 /// An axis along which gravity has less than this part of all of it lies across upright faces.
@@ -46,6 +45,8 @@ pub(crate) struct Material<'a, const D: usize = DIMENSIONS, const C: usize = COM
     pub topology: &'a Topology<D>,
     pub fractions: &'a [f64],
     pub planes: &'a [Option<Plane>],
+    /// The surface where it meets ground.
+    pub shores: &'a Shores,
     pub faces: &'a Faces<D>,
     /// Walls beside the plane, which rub.
     pub side_walls: Option<SideWalls>,
@@ -127,40 +128,6 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             }
         }
         mass
-    }
-
-    /// The surface in a cell. In space dust has none: where some of it lies is a matter of round-off.
-    fn plane(&self, cell: usize) -> Option<&Plane> {
-        let plane = self.planes[cell].as_ref();
-        plane.filter(|_| D == 2 || self.fractions[cell] > EMPTY)
-    }
-
-    /// Distance θ, in cells, from the centre of an active cell to the surface on the way to its
-    /// inactive neighbour along an axis.
-    pub(super) fn surface_distance(
-        &self,
-        active: usize,
-        other: usize,
-        axis: usize,
-        side: usize,
-    ) -> f64 {
-        let mut step = [0.0; D];
-        step[axis] = if side == 1 { 1.0 } else { -1.0 };
-        let back = step.map(|s| -s);
-        let here = [0.0; D];
-        let (inner, outer) = match (self.plane(active), self.plane(other)) {
-            (Some(a), Some(b)) => (depth_of_centre(a, here), depth_of_centre(b, here)),
-            (Some(a), None) => (depth_of_centre(a, here), depth_of_centre(a, step)),
-            (None, Some(b)) => (depth_of_centre(b, back), depth_of_centre(b, here)),
-            (None, None) => (0.5, -0.5),
-        };
-        if inner <= 0.0 {
-            NEAREST_SURFACE
-        } else if outer >= 0.0 {
-            1.0
-        } else {
-            (inner / (inner - outer)).clamp(NEAREST_SURFACE, 1.0)
-        }
     }
 
     /// Divergence of active cells, and the force of their pressure.
@@ -493,10 +460,8 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         if self.stands && is_free && self.acceleration[axis].abs() <= UPRIGHT * most {
             return (self.faces.pressure[inner], 1.0);
         }
-        let distance = self
-            .surface_distance(inner, cell, axis, 1 - side)
-            .max(nearest);
-        (self.faces.pressure[inner], (distance - 1.0) / distance)
+        let beyond = self.beyond(inner, cell, axis, 1 - side);
+        (self.faces.pressure[inner], beyond.extrapolation(nearest))
     }
 
     /// The same pressure where several ways may be alike, as on the diagonal of what mirrors itself there: the
@@ -617,10 +582,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 point.add_pressure(self.faces.pressure[next], -0.5 * share);
                 return;
             }
-            next => {
-                let distance = self.surface_distance(cell, next, axis, 1 - side);
-                (distance - 1.0) / distance
-            }
+            next => self.beyond(cell, next, axis, 1 - side).extrapolation(0.0),
         };
         point.add_pressure(first, 1.5 * share);
         point.add_pressure(first, -0.5 * share * factor);
@@ -628,13 +590,4 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             point.pressure_offset -= 0.5 * share * self.pressure_beyond(next, factor);
         }
     }
-}
-
-/// Depth below a plane, in cells, of the centre of the cell that lies so many steps from its own.
-fn depth_of_centre<const D: usize>(plane: &Plane, steps: [f64; D]) -> f64 {
-    let mut point = [0.5; 3];
-    for (x, step) in point.iter_mut().zip(steps) {
-        *x += step;
-    }
-    plane.depth(point)
 }

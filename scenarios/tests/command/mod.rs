@@ -26,6 +26,23 @@ pub const INSTALMENTS: &[&str] = &[
     "runout.kinetic_share=0.5",
 ];
 
+/// A bed of 3 800 soft grains, 17 diameters wide and 12 deep.
+pub const BED: &[&str] = &[
+    "scale=1",
+    "speed=2",
+    "duration=0.02",
+    "ball.radius=0.0025",
+    "ball.height=0.004",
+    "container.length=0.034",
+    "container.width=0.034",
+    "container.floor=-0.026",
+    "container.grains=3800",
+    "contact.youngs_modulus=1e7",
+    "surfaces.steel.contact.youngs_modulus=1e8",
+    "output.pictures=0",
+    "packing=bed",
+];
+
 /// Settings of the scene `incline` that take a second: 500 grains' mass, 9 of 16 diameters grains in the hybrid.
 pub const SMALL_HYBRID: &[&str] = &[
     "scale=0.85",

@@ -7,6 +7,7 @@ use crate::free_surface::faces::{Face, Faces};
 use crate::free_surface::fraction::reconstruct;
 use crate::free_surface::ground::DUST;
 use crate::free_surface::ground::faces::faces_over;
+use crate::free_surface::ground::shores::Motion;
 use crate::free_surface::operators::{Material, Operators};
 use crate::free_surface::sliding::some_wall_adheres;
 use crate::free_surface::transport::MASSLESS;
@@ -42,6 +43,19 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                         *plane = None;
                     }
                 }
+                let unit = (0..D).fold(0.0, |sum, axis| {
+                    sum + acceleration[axis].abs() * self.grid.axes()[axis].spacing()
+                });
+                self.shores.find(
+                    ground,
+                    &self.topology,
+                    fractions,
+                    &self.planes,
+                    &Motion {
+                        velocity: &self.state.velocity,
+                        unit,
+                    },
+                );
                 faces_over(ground, &self.topology, fractions, acceleration, thin_layer)
             }
         };
@@ -53,6 +67,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             topology: &self.topology,
             fractions,
             planes: &self.planes,
+            shores: &self.shores,
             faces: &faces,
             side_walls: self.side_walls,
             ends: self.ends.as_ref(),

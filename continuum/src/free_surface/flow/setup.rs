@@ -4,6 +4,7 @@
 use super::{INACTIVE, SpaceFlow, Spent, SurfaceFlow, SurfaceOptions, SurfaceState};
 use crate::discretisation::COMPONENTS;
 use crate::error::{Error, require};
+use crate::free_surface::ground::shores::Shores;
 use crate::free_surface::ground::{Ground, Terrain};
 use crate::free_surface::open_ends::{Inflow, OpenEnds, can_open};
 use crate::free_surface::operators::POINTS;
@@ -215,6 +216,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             saved: state.clone(),
             state,
             planes: Vec::new(),
+            shores: Shores::default(),
             transport: Transport::default(),
             carrier: std::array::from_fn(|_| Vec::new()),
             own_leads: Vec::new(),

@@ -105,7 +105,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 found.add(p, 2.0);
                 found.add(pressure(behind), -1.0);
             } else if behind != NONE && ground.master[behind] == behind {
-                let factor = 1.0 + 1.0 / self.surface_distance(beside, behind, axis, side);
+                let factor = 1.0 + self.beyond(beside, behind, axis, side).fall();
                 found.add(p, factor);
                 found.known += self.pressure_beyond(behind, factor);
             } else {
@@ -218,8 +218,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             point.add_pressure(p, 1.0 + depth);
             point.add_pressure(beyond, -depth);
         } else if next != NONE && ground.master[next] == next {
-            let distance = self.surface_distance(master, next, axis, away);
-            let factor = 1.0 + depth / distance;
+            let factor = 1.0 + depth * self.beyond(master, next, axis, away).fall();
             point.add_pressure(p, factor);
             point.pressure_offset += self.pressure_beyond(next, factor);
         } else {

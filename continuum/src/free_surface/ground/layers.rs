@@ -11,6 +11,7 @@
 //!
 //! s is exact where a layer moves the way it is driven, and so is the limit of rest, √(d·G d) = μ g_n.
 
+use super::shores::STANDS_OUT;
 use super::{Contact, Ground, unit};
 use crate::discretisation::{Parts, QuadraturePoint};
 use crate::free_surface::faces::{Face, weight_onto};
@@ -114,25 +115,6 @@ impl<const D: usize> Ground<D> {
         }
         sums
     }
-
-    /// Rise of the surface of a thin layer across a face, in cells along `axis`. Ground that stands out
-    /// beside it does not push it.
-    pub(crate) fn surface_rise(
-        &self,
-        topology: &Topology<D>,
-        fractions: &[f64],
-        axis: usize,
-        [low, high]: [usize; 2],
-    ) -> f64 {
-        let [[low_filled, low_level], [high_filled, high_level]] =
-            [low, high].map(|cell| self.thickness(topology, fractions, axis, cell));
-        let rise = high_level - low_level;
-        if (high_filled <= EMPTY && rise > 0.0) || (low_filled <= EMPTY && rise < 0.0) {
-            0.0
-        } else {
-            rise
-        }
-    }
 }
 
 impl<const D: usize, const C: usize> Material<'_, D, C> {
@@ -151,6 +133,43 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         })
     }
 
+    /// Rise of the surface of a thin layer across a face, in cells along `axis`. Ground that stands out
+    /// beside it does not push it.
+    fn surface_rise(&self, ground: &Ground<D>, axis: usize, [low, high]: [usize; 2]) -> f64 {
+        let [[low_filled, low_level], [high_filled, high_level]] = [low, high].map(|cell| {
+            let [filled, level] = ground.thickness(self.topology, self.fractions, axis, cell);
+            [filled, self.level_at_shore(ground, axis, cell, level)]
+        });
+        let rise = high_level - low_level;
+        if (high_filled <= EMPTY && rise > 0.0) || (low_filled <= EMPTY && rise < 0.0) {
+            0.0
+        } else {
+            rise
+        }
+    }
+
+    /// Height of the surface in the middle of a column of three cells with one in the middle, from its foot: that of matter
+    /// and ground, `level`, but of the surface of matter where ground stands out of it in one of them and it leans to the
+    /// axis most.
+    fn level_at_shore(&self, ground: &Ground<D>, axis: usize, cell: usize, level: f64) -> f64 {
+        let [below, above] = self.topology.cell_neighbours[cell][axis];
+        let column = [below, cell, above].into_iter().enumerate();
+        let mut at_shore = column
+            .filter(|&(_, at)| at != NONE)
+            .filter_map(|(row, at)| {
+                let shore = self.shores.at(at).filter(|shore| shore.weight > 0.0)?;
+                let lean = shore.fitted.normal[axis];
+                let leans_most = shore.fitted.normal.iter().all(|n| n.abs() <= lean);
+                (leans_most && ground.standing_out(at, &shore.fitted) > STANDS_OUT).then(|| {
+                    let mut foot = [0.5; 3];
+                    foot[axis] = 0.0;
+                    let there = row as f64 + shore.fitted.depth(foot) / lean;
+                    level + shore.weight * (there - level)
+                })
+            });
+        at_shore.next().unwrap_or(level)
+    }
+
     /// f at a face of a component, on a slope.
     fn force_on_layer(
         &self,
@@ -161,8 +180,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
     ) -> [f64; D] {
         let spacing = |axis: usize| self.grid.axes()[axis].spacing();
         let rise = |low: usize, high: usize, along: usize| {
-            ground.surface_rise(self.topology, self.fractions, slope.axis, [low, high])
-                * spacing(slope.axis)
+            self.surface_rise(ground, slope.axis, [low, high]) * spacing(slope.axis)
                 / spacing(along)
         };
         let [low, high] = self.topology.face_cells[component][face];

@@ -114,16 +114,17 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                         };
                         let (mut force, mut pressed) = (0.0, 0.0);
                         if mass > 0.0 {
-                            let distance = if self.faces.pressure[other] == NONE {
-                                self.surface_distance(member, other, axis, side)
+                            let fall = if self.faces.pressure[other] == NONE {
+                                self.beyond(member, other, axis, side).fall()
                             } else {
                                 1.0
                             };
-                            force = outwards * mass / (distance * self.grid.axes()[axis].spacing());
+                            force = outwards * mass * fall / self.grid.axes()[axis].spacing();
                             if let Some(outside) = self.outside
+                                && fall > 0.0
                                 && self.faces.pressure[ground.master[other]] == NONE
                             {
-                                pressed = force * outside.on_surface(member, other, distance);
+                                pressed = force * outside.on_surface(member, other, 1.0 / fall);
                             }
                         }
                         for (j, share) in self.faces.moved_by(axis, face, axis) {

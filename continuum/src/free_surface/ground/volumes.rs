@@ -1,0 +1,179 @@
+//! Volume of a unit cell under two planes at once: what of the matter under a surface is ground.
+
+use crate::free_surface::plane::Plane;
+
+/// Most corners of a square cut by two lines.
+const MOST_CORNERS: usize = 6;
+
+/// Volume of the unit cell under two planes.
+pub(super) fn common_volume(one: &Plane, other: &Plane) -> f64 {
+    const WHOLE: ([f64; 3], [f64; 3]) = ([0.0; 3], [1.0; 3]);
+    if is_above(one) {
+        return other.volume_in(WHOLE.0, WHOLE.1);
+    }
+    if is_above(other) {
+        return one.volume_in(WHOLE.0, WHOLE.1);
+    }
+    if is_above(&turned_over(one)) || is_above(&turned_over(other)) {
+        return 0.0;
+    }
+    if one.normal[2] == 0.0 && other.normal[2] == 0.0 {
+        common_area(one, other)
+    } else {
+        common_volume_in_space(one, other)
+    }
+}
+
+fn turned_over(plane: &Plane) -> Plane {
+    Plane {
+        normal: plane.normal.map(|n| -n),
+        offset: -plane.offset,
+    }
+}
+
+/// Whether all of the unit cell lies under a plane.
+fn is_above(plane: &Plane) -> bool {
+    plane.offset >= plane.normal.iter().map(|n| n.max(0.0)).sum()
+}
+
+/// The same where neither plane leans to the third axis.
+fn common_area(one: &Plane, other: &Plane) -> f64 {
+    let mut corners = [[0.0; 2]; MOST_CORNERS];
+    corners[..4].copy_from_slice(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
+    let mut count = 4;
+    for plane in [one, other] {
+        let depth = |[x, y]: [f64; 2]| plane.depth([x, y, 0.0]);
+        let mut left = [[0.0; 2]; MOST_CORNERS];
+        let mut kept = 0;
+        let mut keep = |corner: [f64; 2]| {
+            if let Some(slot) = left.get_mut(kept) {
+                *slot = corner;
+                kept += 1;
+            }
+        };
+        for n in 0..count {
+            let (from, to) = (corners[n], corners[(n + 1) % count]);
+            let (a, b) = (depth(from), depth(to));
+            if a > 0.0 {
+                keep(from);
+            }
+            if (a > 0.0) != (b > 0.0) {
+                let part = a / (a - b);
+                keep([0, 1].map(|k| from[k] + part * (to[k] - from[k])));
+            }
+        }
+        corners = left;
+        count = kept;
+    }
+    let mut twice = 0.0;
+    for n in 1..count.saturating_sub(1) {
+        let [a, b] = [corners[n], corners[n + 1]].map(|c| [0, 1].map(|k| c[k] - corners[0][k]));
+        twice += a[0] * b[1] - a[1] * b[0];
+    }
+    0.5 * twice
+}
+
+fn common_volume_in_space(one: &Plane, other: &Plane) -> f64 {
+    const ORDERS: [[usize; 3]; 6] = [
+        [0, 1, 2],
+        [0, 2, 1],
+        [1, 0, 2],
+        [1, 2, 0],
+        [2, 0, 1],
+        [2, 1, 0],
+    ];
+    // Six tetrahedra about the diagonal (Kuhn).
+    let mut sum = 0.0;
+    for order in ORDERS {
+        let mut corners = [[0.0; 3]; 4];
+        for n in 1..4 {
+            corners[n] = corners[n - 1];
+            corners[n][order[n - 1]] = 1.0;
+        }
+        sum += volume_under(&corners, &[one, other]);
+    }
+    sum
+}
+
+/// Volume of a tetrahedron under planes.
+fn volume_under(corners: &[[f64; 3]; 4], planes: &[&Plane]) -> f64 {
+    let Some((plane, others)) = planes.split_first() else {
+        let [a, b, c] = [1, 2, 3].map(|n| {
+            let edge: [f64; 3] = std::array::from_fn(|k| corners[n][k] - corners[0][k]);
+            edge
+        });
+        let normal: [f64; 3] = std::array::from_fn(|k| {
+            a[(k + 1) % 3] * b[(k + 2) % 3] - a[(k + 2) % 3] * b[(k + 1) % 3]
+        });
+        return normal.iter().zip(c).map(|(n, c)| n * c).sum::<f64>().abs() / 6.0;
+    };
+    let depths = corners.map(|corner| plane.depth(corner));
+    // Those under the plane first.
+    let mut order = [0; 4];
+    let mut under = 0;
+    for wanted in [true, false] {
+        let first = if wanted { 0 } else { under };
+        let mut next = first;
+        for (n, depth) in depths.iter().enumerate() {
+            if (*depth > 0.0) == wanted {
+                order[next] = n;
+                next += 1;
+            }
+        }
+        if wanted {
+            under = next;
+        }
+    }
+    let at = |n: usize| corners[order[n]];
+    // Where the plane cuts the edge from a corner under it to one above.
+    let cut = |n: usize, m: usize| {
+        let (from, to) = (depths[order[n]], depths[order[m]]);
+        let part = from / (from - to);
+        let point: [f64; 3] = std::array::from_fn(|k| at(n)[k] + part * (at(m)[k] - at(n)[k]));
+        point
+    };
+    let prism = |[a, b, c]: [[f64; 3]; 3], [d, e, f]: [[f64; 3]; 3]| {
+        [[a, b, c, d], [b, c, d, e], [c, d, e, f]]
+            .iter()
+            .map(|part| volume_under(part, others))
+            .sum()
+    };
+    match under {
+        0 => 0.0,
+        1 => volume_under(&[at(0), cut(0, 1), cut(0, 2), cut(0, 3)], others),
+        2 => prism([at(0), cut(0, 2), cut(0, 3)], [at(1), cut(1, 2), cut(1, 3)]),
+        3 => prism([at(0), at(1), at(2)], [cut(0, 3), cut(1, 3), cut(2, 3)]),
+        _ => volume_under(corners, others),
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    /// Under one plane twice there is what is under it; under a plane and its other side nothing; a level plane
+    /// and an upright one cut off a box, two slanted ones what integration says.
+    #[test]
+    fn common_volumes_by_hand() {
+        let plane = |normal, fraction| Plane::of_fraction(normal, fraction);
+        let back = |p: Plane| Plane {
+            normal: p.normal.map(|n| -n),
+            offset: -p.offset,
+        };
+        for normal in [[0.3, 0.8, 0.0], [-0.3, 0.2, 0.9], [1.0, 0.0, 0.0]] {
+            for fraction in [0.02, 0.4, 0.77] {
+                let one = plane(normal, fraction);
+                assert!((common_volume(&one, &one) - fraction).abs() < 1e-14);
+                assert!(common_volume(&one, &back(one)).abs() < 1e-14);
+                let level = plane([0.1, 0.9, -0.2], 0.6);
+                let both = common_volume(&one, &level) + common_volume(&back(one), &level);
+                assert!((both - 0.6).abs() < 1e-14, "{both}");
+            }
+        }
+        let level = plane([0.0, 1.0, 0.0], 0.4);
+        assert!((common_volume(&level, &plane([1.0, 0.0, 0.0], 0.3)) - 0.12).abs() < 1e-15);
+        // Under y = 0.4 and y = x: ∫ min(x, 0.4) dx.
+        let slanted = plane([-1.0, 1.0, 0.0], 0.5);
+        assert!((common_volume(&level, &slanted) - (0.08 + 0.24)).abs() < 1e-15);
+    }
+}
