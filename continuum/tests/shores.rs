@@ -330,12 +330,3 @@ fn run_outs_do_not_part_by_round_off() {
         assert!((many / few - 1.0).abs() < 1e-6, "{many} {few}");
     }
 }
-
-/// The last matter of a column on a slope below repose stops, though any plane fits a speck.
-#[test]
-fn specks_on_a_slope_come_to_rest() {
-    let points = vec![[0.0, 1.0], [1.2, 1.0], [5.0, 0.24]];
-    let (front, time) = front_of_column(points, 1.42, [64, 5], 12.0);
-    println!("{front} {time:?}");
-    assert!(time.is_some());
-}

@@ -105,8 +105,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 found.add(p, 2.0);
                 found.add(pressure(behind), -1.0);
             } else if behind != NONE && ground.master[behind] == behind {
-                let fall = self.beyond(beside, behind, axis, side).fall();
-                let factor = 1.0 + fall;
+                let factor = 1.0 + self.beyond(beside, behind, axis, side).fall();
                 found.add(p, factor);
                 found.known += self.pressure_beyond(behind, factor);
             } else {
@@ -219,8 +218,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             point.add_pressure(p, 1.0 + depth);
             point.add_pressure(beyond, -depth);
         } else if next != NONE && ground.master[next] == next {
-            let fall = self.beyond(master, next, axis, away).fall();
-            let factor = 1.0 + depth * fall;
+            let factor = 1.0 + depth * self.beyond(master, next, axis, away).fall();
             point.add_pressure(p, factor);
             point.pressure_offset += self.pressure_beyond(next, factor);
         } else {
