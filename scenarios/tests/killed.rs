@@ -75,7 +75,7 @@ fn killed_and_whole(
         packing.put(folder.path());
     }
     let arguments = |out: &'static str, more: &[&'static str]| {
-        let mut list = vec!["run", scene, "--out", out, "--checkpoint-every", "0"];
+        let mut list = vec!["run", scene, "--out", out];
         for set in sets {
             list.extend(["--set", set]);
         }
@@ -88,12 +88,17 @@ fn killed_and_whole(
     let [whole, parts] = ["whole", "parts"].map(|name| folder.path().join(name));
 
     let mut random = ChaCha8Rng::seed_from_u64(seed);
-    let resume = |now: &mut dyn FnMut() -> bool| {
+    // What is cut in the middle of a file writes one at every chance, which are ten thousands in a run that exchanges; the rest
+    // some fifty.
+    let now_and_then = format!("{:.4}", duration.as_secs_f64() / 50.0);
+    let resume = |every: &str, now: &mut dyn FnMut() -> bool| {
         // Before its first file stands a run is begun, not resumed.
         let begun = parts.join("summary.json").exists();
         let more = &["--threads", "2", "--resume"];
         let more = &more[..if begun { 3 } else { 2 }];
-        kill(folder.path(), &arguments("parts", more), now)
+        let mut list = arguments("parts", more);
+        list.extend(["--checkpoint-every", every]);
+        kill(folder.path(), &list, now)
     };
     let mut kills = 0;
     // In the middle of writing a checkpoint, and, where there are any, a frame: who waits for one that never comes lets the run
@@ -103,7 +108,8 @@ fn killed_and_whole(
     let places = [parts.clone(), parts.join("frames")];
     for (k, place) in places.iter().take(1 + usize::from(framed)).enumerate() {
         for _ in 0..6 {
-            if cut[k] < 2 && resume(&mut || unfinished(place)) {
+            let every = ["0", &now_and_then][k];
+            if cut[k] < 2 && resume(every, &mut || unfinished(place)) {
                 kills += 1;
                 cut[k] += u32::from(unfinished(place));
             }
@@ -112,7 +118,7 @@ fn killed_and_whole(
     for _ in 0..random_kills {
         let wait = duration.mul_f64(random.random_range(0.0..0.3));
         let begin = Instant::now();
-        kills += u32::from(resume(&mut || begin.elapsed() > wait));
+        kills += u32::from(resume(&now_and_then, &mut || begin.elapsed() > wait));
     }
     println!("{scene}: {duration:.1?} whole, {kills} kills, {cut:?} in checkpoints and frames");
     assert!(kills > 0 && cut[0] > 0, "{kills} {cut:?}");
