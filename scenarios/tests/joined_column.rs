@@ -36,7 +36,6 @@ fn a_joined_column_collapses_as_its_grains_do() {
     let folder = tempfile::tempdir().unwrap();
     let at = |name: &str| folder.path().join(name);
     JOINED_COLUMN.put(folder.path());
-    JOINED_COLUMN.put(folder.path());
     let [dem, none] = [["model=dem"], ["overlap.uncoupled=true"]];
     succeed(folder.path(), &arguments("grains", &dem));
     let mut one = arguments("joined", &[]);
@@ -141,7 +140,6 @@ fn a_joined_column_collapses_as_its_grains_do() {
 #[test]
 fn an_edge_that_moves_hands_grains_over_and_keeps_its_books() {
     let folder = tempfile::tempdir().unwrap();
-    JOINED_COLUMN.put(folder.path());
     JOINED_COLUMN.put(folder.path());
     for threads in ["1", "2"] {
         let mut run = arguments(threads, MOVING_EDGE);
@@ -308,7 +306,6 @@ fn a_width_of_the_overlap_varies_with_the_tolerance() {
     );
     assert!(planned(&[]).starts_with("overlap.width 0.6000 m, of which shell 2.0 d, buffer 3.0 d"));
 
-    JOINED_COLUMN.put(folder.path());
     JOINED_COLUMN.put(folder.path());
     let mut arguments = arguments("p", &["duration_scaled=0.5"]);
     arguments[0] = "pareto";

@@ -4,6 +4,8 @@
 //! ```text
 //! change(N) = ∫|h_N − h_2N| dx / A
 //! ```
+//! Ours is the heap at rest, the peer's that at t = 6 √(H/g), when it still moves.
+//!
 //! `cargo run --release -p colluvium-benchmarks --bin column-errors` runs the column of a = 0.5 on 32 to 256 cells along x;
 //! `--aspect 1.42 --from 32 --doublings 3` another. Prints Markdown; `--svg FILE` draws it.
 
@@ -30,10 +32,10 @@ struct Arguments {
     #[arg(long, default_value_t = 0.5)]
     aspect: f64,
     /// Fewest cells along x.
-    #[arg(long, default_value_t = 32)]
-    from: usize,
+    #[arg(long, default_value_t = 32, value_parser = clap::value_parser!(u32).range(8..=4096))]
+    from: u32,
     /// How often they are doubled.
-    #[arg(long, default_value_t = 3)]
+    #[arg(long, default_value_t = 3, value_parser = clap::value_parser!(u32).range(1..=6))]
     doublings: u32,
     /// Picture to draw.
     #[arg(long)]
@@ -109,7 +111,7 @@ fn main() -> Outcome<()> {
     let column = COLUMNS
         .iter()
         .find(|column| column.aspect == arguments.aspect)
-        .ok_or("--aspect: 0.5, 1.42 or 6.26")?;
+        .ok_or_else(|| format!("--aspect {}: 0.5, 1.42 or 6.26", arguments.aspect))?;
     let area = 1.0 / column.aspect;
     println!("# Heap of a column, a = {}\n", column.aspect);
     println!("| cells | time of rest, √(H/g) | CPU s | change on twice as many, of the area |");
@@ -117,7 +119,7 @@ fn main() -> Outcome<()> {
     let mut changes = Changes::new();
     let mut coarse: Option<(usize, Profile, f64, f64)> = None;
     for doubling in 0..=arguments.doublings {
-        let cells = arguments.from << doubling;
+        let cells = (arguments.from as usize) << doubling;
         let (profile, rest, seconds) = heap(column, cells)?;
         if let Some((cells, before, rest, seconds)) = coarse {
             let change = before.apart(&profile) / area;

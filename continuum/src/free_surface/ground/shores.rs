@@ -36,6 +36,8 @@ const PASSES: usize = 2;
 const FITS: [f64; 2] = [1e-4, 1e-3];
 /// Square of the speed, over g h, beyond which matter is not at rest.
 const SLOW: f64 = 0.01;
+/// How far from dry ground shores are looked for, in cells: a layer half a cell thick ends within them on slopes of 0.07 and more.
+const REACH: usize = 8;
 /// Less ground than this part of a cell does not stand out of matter.
 pub(super) const STANDS_OUT: f64 = 1e-9;
 
@@ -44,10 +46,9 @@ pub(super) const STANDS_OUT: f64 = 1e-9;
 pub(crate) struct Shores {
     cells: Vec<Shore>,
     next: Vec<Shore>,
-    /// Whether dry ground lies beside a cell with matter.
-    is_last: Vec<bool>,
-    /// Whether such a cell lies beside it, or it is one.
+    /// Whether dry ground lies within [`REACH`] of a cell with matter, and within one cell less.
     is_near: Vec<bool>,
+    is_nearer: Vec<bool>,
 }
 
 /// How matter moves.
@@ -128,22 +129,19 @@ impl Shores {
             if rest == 0.0 {
                 continue;
             }
-            let around = Neighbourhood::around(topology, fractions, cell);
-            let is_near = self.is_near[cell];
-            if !is_near && !around.any(|at| self.is_near[at]) {
+            if !self.is_near[cell] {
                 continue;
             }
-            let is_exact = ground.miss(&around, &plane, EXACT) <= EXACT;
-            if is_near || is_exact {
-                self.cells.push(Shore {
-                    cell,
-                    fitted: plane,
-                    weight: if is_exact { rest } else { 0.0 },
-                    plane,
-                    rest,
-                    is_exact,
-                });
-            }
+            let around = Neighbourhood::around(topology, fractions, cell);
+            let miss = ground.miss(&around, &plane, FITS[1]);
+            self.cells.push(Shore {
+                cell,
+                fitted: plane,
+                weight: rest * fit(miss),
+                plane,
+                rest,
+                is_exact: miss <= EXACT,
+            });
         }
         for _ in 0..PASSES {
             self.next.clear();
@@ -173,7 +171,7 @@ impl Shores {
         }
     }
 
-    /// Notes beside which cells with matter dry ground lies, and beside which ones of those.
+    /// Notes which cells with a surface lie near dry ground.
     fn mark<const D: usize>(
         &mut self,
         ground: &Ground<D>,
@@ -189,14 +187,22 @@ impl Shores {
         let beside = |cell: usize, holds: &dyn Fn(usize) -> bool| {
             planes[cell].is_some() && Neighbourhood::around(topology, fractions, cell).any(holds)
         };
-        self.is_last.clear();
-        self.is_last
-            .extend((0..planes.len()).map(|cell| beside(cell, &is_dry)));
-        let is_last = &self.is_last;
         self.is_near.clear();
         self.is_near
-            .extend((0..planes.len()).map(|cell| beside(cell, &|at| is_last[at])));
+            .extend((0..planes.len()).map(|cell| beside(cell, &is_dry)));
+        for _ in 1..REACH {
+            std::mem::swap(&mut self.is_near, &mut self.is_nearer);
+            let is_nearer = &self.is_nearer;
+            self.is_near.clear();
+            self.is_near
+                .extend((0..planes.len()).map(|cell| beside(cell, &|at| is_nearer[at])));
+        }
     }
+}
+
+/// How much a plane counts that misses by a sum of squares.
+fn fit(miss: f64) -> f64 {
+    ((FITS[1] - miss) / (FITS[1] - FITS[0])).clamp(0.0, 1.0)
 }
 
 impl<const D: usize> Ground<D> {
@@ -209,7 +215,7 @@ impl<const D: usize> Ground<D> {
         rest: f64,
     ) -> Option<Shore> {
         let (fitted, miss) = self.fitted_plane(around, at_hand)?;
-        let weight = rest * ((FITS[1] - miss) / (FITS[1] - FITS[0])).clamp(0.0, 1.0);
+        let weight = rest * fit(miss);
         let stands_out = |(cell, low, _): (usize, [f64; 3], f64)| {
             self.standing_out(cell, &seen_from(&fitted, low)) > STANDS_OUT
         };

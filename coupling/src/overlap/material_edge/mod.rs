@@ -420,8 +420,8 @@ impl MaterialEdge {
         self.spec.side.in_plane([sum.x, sum.z])
     }
 
-    /// Where the handshake surface is, row by row (m): where grains of nearby labels have moved to.
+    /// Where the handshake surface is, row by row from z = 0 on (m): where grains of nearby labels have moved to.
     pub fn handshake(&self) -> &[f64] {
-        &self.held.handshake
+        &self.held.handshake[self.cells.below..]
     }
 }

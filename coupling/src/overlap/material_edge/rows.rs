@@ -104,7 +104,11 @@ pub fn slopes(places: &[f64], cells: &Cells) -> Vec<f64> {
     let last = places.len() - 1;
     (0..places.len())
         .map(|k| {
-            let (low, high) = (k.saturating_sub(1), (k + 1).min(last));
+            // Rows below the floor have no grains.
+            if k < cells.below {
+                return 0.0;
+            }
+            let (low, high) = (k.saturating_sub(1).max(cells.below), (k + 1).min(last));
             (places[high] - places[low]) / ((high - low).max(1) as f64 * cells.spacing)
         })
         .collect()

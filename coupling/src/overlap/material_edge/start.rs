@@ -56,17 +56,21 @@ pub(super) fn column(
 }
 
 /// Part of a cell of a column that lies between a face which leans out by `lean` a row and an upright one, in rows from one to
-/// another: the integral of `clamp(e - face(z), 0, e - i)` over them, e the end of the column in the cell.
+/// another: the integral of `clamp(e - face(z), 0, e - i)` over them, e the end of the column in the cell. Its mean is found from
+/// how much of the face lies in the cell and beyond it, which a face that hardly leans leaves exact.
 fn behind_face([low, high]: [f64; 2], lean: f64, column: usize, [from, to]: [f64; 2]) -> f64 {
     let begin = column as f64;
     let end = high.clamp(begin, begin + 1.0);
     let width = end - begin;
-    let integral = |z: f64| {
-        let deep = end - low + lean * z;
-        let inside = deep.clamp(0.0, width);
-        0.5 * inside * inside + width * (deep - width).max(0.0)
-    };
-    ((integral(to) - integral(from)) / lean).max(0.0)
+    let [deep, deepest] = [from, to].map(|z| end - low + lean * z);
+    let rise = deepest - deep;
+    if rise <= 0.0 {
+        return (to - from) * deep.clamp(0.0, width);
+    }
+    let (first, last) = (deep.clamp(0.0, width), deepest.clamp(0.0, width));
+    let beyond = (deepest - deep.max(width)).max(0.0);
+    let mean = ((last - first) * 0.5 * (first + last) + beyond * width) / rise;
+    (to - from) * mean.min(width)
 }
 
 #[cfg(test)]

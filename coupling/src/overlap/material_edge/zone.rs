@@ -43,7 +43,9 @@ impl GrainZone {
         for own in continua.filter(|own| floor::has_front(&specs[own.clone()])) {
             let spec = &specs[own.start];
             let width = spec.place + spec.zones()[1] - spec.back;
-            let mass = spec.density() * spec.slab * width * spec.case.height;
+            let height = spec.case.height;
+            let area = width * height + 0.5 * spec.lean() * height * height;
+            let mass = spec.density() * spec.slab * area;
             start::column(spec, &spec.column(mass), &spec.options, Some(ground))?;
         }
         Ok(())

@@ -600,7 +600,7 @@ fn moves(zone: &GrainZone, summary: &mut Summary) -> Option<Table> {
     for edge in edges {
         if let Some((times, first)) = edge.stopped_moves() {
             summary.remarks.push(format!(
-                "{times} moves inwards of the edge that is now at {:.4} m, the first at t = {first:.4} s, were not made: the ground there is not level.",
+                "At {times} exchanges, the first at t = {first:.4} s, the edge that is now at {:.4} m was to come back and did not: the ground there is not level.",
                 edge.spec().side.along(edge.spec().place + edge.travelled())
             ));
         }
