@@ -63,7 +63,7 @@ fn unfinished(folder: &Path) -> bool {
 }
 
 /// Runs a scene whole on one thread, and on two in parts that are killed at random moments, in the middle of a checkpoint
-/// and in the middle of a frame; both must end in the same state, rows and frames. Gives the folder of both.
+/// and, where one is caught, of a frame; both must end in the same state, rows and frames. Gives the folder of both.
 fn killed_and_whole(
     packing: Option<&Kept>,
     (scene, sets): (&str, &[&str]),
