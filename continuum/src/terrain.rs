@@ -35,6 +35,26 @@ pub trait Relief<const N: usize> {
 
     /// The distance of points of a grid from the ground's surface (m); what lies far off may count as some cells away.
     fn distances(&self, lines: &GridLines<N>) -> impl Fn([f64; N]) -> f64;
+
+    /// The ground in cells within which its surface bends, in the order of the cells, where it is known piece by piece; in others
+    /// a plane says where it lies.
+    fn bends(&self, _: &GridLines<N>) -> Vec<Strip> {
+        Vec::new()
+    }
+}
+
+/// What lies under a straight piece of the ground's line within a cell, in the cell's coordinates from 0 to 1. The ground is the sum over its
+/// pieces, with their signs.
+#[derive(Debug, Clone, Copy, PartialEq)]
+pub struct Strip {
+    /// Number of the cell.
+    pub cell: usize,
+    /// From where to where it reaches along x,
+    pub ends: [f64; 2],
+    /// and its height there.
+    pub heights: [f64; 2],
+    /// 1, or −1 under a soffit.
+    pub sign: f64,
 }
 
 impl Relief<2> for Profile {
@@ -44,6 +64,10 @@ impl Relief<2> for Profile {
 
     fn distances(&self, _: &GridLines<2>) -> impl Fn([f64; 2]) -> f64 {
         |point| self.distance(point)
+    }
+
+    fn bends(&self, lines: &GridLines<2>) -> Vec<Strip> {
+        Profile::bends(self, lines)
     }
 }
 

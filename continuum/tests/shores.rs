@@ -48,7 +48,7 @@ fn misses(pressure: &[f64], row: usize, level: f64, speed: f64) -> [f64; 3] {
             }
         }
     }
-    assert!(compared > 10, "{compared} cells with a pressure");
+    assert!(compared > 5, "{compared} cells with a pressure");
     worst
 }
 
@@ -138,35 +138,69 @@ fn with_crossings(points: &[[f64; 2]], level: f64) -> Vec<[f64; 2]> {
     all
 }
 
-/// Ground that is curved, a valley and a hill: within a cell it is a plane to the solver, so what a level surface misses of
-/// the matter beside it is of second order in the cell. (Under planes of matter and ground together the mean is 3.0 and
-/// 1.7 %, the worst 9.9 and 7.6 %.)
+/// The same over a line of ground with a level surface, which ends where it meets the ground.
+fn level_pond(points: Vec<[f64; 2]>, level: f64) -> [f64; 3] {
+    let surface = with_crossings(&points, level);
+    let surface = surface.into_iter().map(|[x, z]| [x, z.max(level)]);
+    let surface = Profile::new(surface.collect()).unwrap();
+    pond_under(&surface, &Profile::new(points).unwrap(), level)
+}
+
+/// Ground that is curved, a valley and a hill, of twenty pieces a cell: within a cell it is what it is, not a plane. (Under planes
+/// of matter and ground together the mean is 3.0 and 1.7 %, the worst 9.9 and 7.6 %; with a plane of ground in each cell 0.08 and 0.04,
+/// 0.40 and 0.21 %.)
 #[test]
 fn pressure_at_shores_of_curved_ground() {
     let valley = |r: f64| 1.2 + r * r / 25.0;
     let hill = |r: f64| 7.5 - r * r / 20.0;
     for (name, height) in [("valley", &valley as &dyn Fn(f64) -> f64), ("hill", &hill)] {
-        let (mut worst, mut sum, mut beyond, mut count, mut speed) = (0.0_f64, 0.0, 0, 0, 0.0_f64);
+        let mut worst = [0.0_f64; 3];
         for level in [4.05, 4.3, 4.55, 4.8, 5.1] {
             for shift in [0.0, 0.21, 0.43, 0.68] {
                 let x = (-400..=640).map(|i| 0.05 * f64::from(i));
                 let points: Vec<_> = x.map(|x| [x, height(x - 12.0 - shift)]).collect();
-                let surface = with_crossings(&points, level);
-                let surface = surface.into_iter().map(|[x, z]| [x, z.max(level)]);
-                let surface = Profile::new(surface.collect()).unwrap();
-                let ground = Profile::new(points).unwrap();
-                let [_, relative, moving] = pond_under(&surface, &ground, level);
-                worst = worst.max(relative);
-                speed = speed.max(moving);
-                sum += relative;
-                beyond += usize::from(relative > 1e-3);
-                count += 1;
+                let found = level_pond(points, level);
+                worst = std::array::from_fn(|n| worst[n].max(found[n]));
             }
         }
-        let mean = sum / f64::from(count);
-        println!("{name}: mean {mean:.2e}, worst {worst:.2e}, {beyond} of {count} beyond 0.1 %");
-        assert!(worst < 4e-3 && mean < 1e-3, "{name} {worst:e} {mean:e}");
+        let [miss, relative, speed] = worst;
+        println!("{name}: {miss:.2e} {relative:.2e} {speed:.1e}");
+        assert!(
+            miss < 1e-9 && relative < 1e-9,
+            "{name} {miss:e} {relative:e}"
+        );
         assert!(speed < 1e-6 * DIAMETER.sqrt(), "{name} {speed:e}");
+    }
+}
+
+/// Ground of kinks at random heights, with slopes up to 2.7, islands and ridges narrower than a cell among them. (With a plane of ground in each cell the pressure beside kinks 3.7 cells apart was up to 50 % off and
+/// matter moved.)
+#[test]
+fn pressure_at_shores_among_kinks() {
+    for spacing in [1.3, 2.3, 3.7] {
+        let mut worst = [0.0_f64; 3];
+        for seed in 0..12_u64 {
+            let mut state = 17 + 1000 * seed + (10.0 * spacing) as u64;
+            let mut random = || {
+                state = state
+                    .wrapping_mul(6_364_136_223_846_793_005)
+                    .wrapping_add(1_442_695_040_888_963_407);
+                (state >> 33) as f64 / f64::from(1_u32 << 31)
+            };
+            let points = (0..(70.0 / spacing) as u32)
+                .map(|n| [spacing * f64::from(n) - 20.0, 2.0 + 3.5 * random()]);
+            let level = 4.05 + 0.3 * (seed % 4) as f64;
+            let found = level_pond(points.collect(), level);
+            println!("{spacing} {seed}: {found:?}");
+            worst = std::array::from_fn(|n| worst[n].max(found[n]));
+        }
+        let [miss, relative, speed] = worst;
+        println!("{spacing}: {miss:.2e} {relative:.2e} {speed:.1e}");
+        assert!(
+            miss < 1e-9 && relative < 1e-9,
+            "{spacing} {miss:e} {relative:e}"
+        );
+        assert!(speed < 1e-6 * DIAMETER.sqrt(), "{spacing} {speed:e}");
     }
 }
 

@@ -40,6 +40,7 @@ mod volumes;
 use serde::{Deserialize, Serialize};
 
 use self::cuts::{Cuts, Sheet, centre_of, corner_of_face, lines_of, mean, near};
+use self::volumes::Bend;
 use super::operators::points_of;
 use super::plane::Plane;
 use super::topology::{NONE, Topology};
@@ -124,6 +125,8 @@ pub(crate) struct Ground<const D: usize = DIMENSIONS> {
     pub solid: Vec<f64>,
     /// Surface of the ground in each cell that it cuts.
     pub planes: Vec<Option<Plane>>,
+    /// Ground in cells within which its surface bends.
+    bends: Vec<(usize, Bend)>,
     /// Free part of each part of a cell, in cells, cell by cell.
     parts_of_cells: Vec<f64>,
     /// Free part of each face.
@@ -225,6 +228,12 @@ impl<const D: usize> Ground<D> {
                 ground.planes[cell] = Some(Plane::of_fraction(normal, solid));
             }
         }
+        let strips = terrain.shape.bends(&lines);
+        let cells = strips.chunk_by(|a, b| a.cell == b.cell);
+        ground.bends = cells
+            .filter(|strips| ground.planes[strips[0].cell].is_some())
+            .map(|strips| (strips[0].cell, Bend::of(strips)))
+            .collect();
         Ok(ground)
     }
 
@@ -246,6 +255,7 @@ impl<const D: usize> Ground<D> {
             contact: terrain.contact,
             solid: free.iter().map(|free| 1.0 - free).collect(),
             planes: vec![None; count],
+            bends: Vec::new(),
             parts_of_cells: cuts.parts.clone(),
             aperture: std::array::from_fn(|_| Vec::new()),
             edge: std::array::from_fn(|_| Vec::new()),

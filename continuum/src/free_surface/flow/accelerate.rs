@@ -43,8 +43,8 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                         *plane = None;
                     }
                 }
-                let unit = (0..D).fold(0.0, |sum, axis| {
-                    sum + acceleration[axis].abs() * self.grid.axes()[axis].spacing()
+                let falls = std::array::from_fn(|axis| {
+                    -acceleration[axis] * self.grid.axes()[axis].spacing()
                 });
                 self.shores.find(
                     ground,
@@ -53,7 +53,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                     &self.planes,
                     &Motion {
                         velocity: &self.state.velocity,
-                        unit,
+                        falls,
                     },
                 );
                 faces_over(ground, &self.topology, fractions, acceleration, thin_layer)

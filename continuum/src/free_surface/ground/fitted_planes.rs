@@ -14,8 +14,8 @@ const ALIKE: f64 = 1e-4;
 const STEPS: usize = 60;
 /// Volumes that differ by less, in cells, are the same.
 const SAME: f64 = 1e-15;
-/// Most planes to begin with: the cell itself, those beside it.
-const MOST_CANDIDATES: usize = 7;
+/// Most planes to begin with: that of the cell itself, those of the cells beside it, a level one.
+const MOST_CANDIDATES: usize = 8;
 /// Planes that miss by more, in squares of cells, are too far off to begin with.
 const FAR: f64 = 1e-2;
 /// Turns of a plane towards the least miss.
@@ -174,6 +174,9 @@ impl<const D: usize> Ground<D> {
             return 0.0;
         }
         let all = plane.volume_in([0.0; 3], [1.0; 3]);
+        if let Ok(at) = self.bends.binary_search_by_key(&cell, |bend| bend.0) {
+            return all - self.bends[at].1.under(plane);
+        }
         match &self.planes[cell] {
             None => (all - self.solid[cell]).max(0.0),
             Some(ground) => all - common_volume(plane, ground),

@@ -25,6 +25,7 @@
 
 use super::fitted_planes::seen_from;
 use super::{DUST, Ground};
+use crate::free_surface::faces::ACTIVE;
 use crate::free_surface::fraction::{EXACT, Neighbourhood};
 use crate::free_surface::plane::Plane;
 use crate::free_surface::topology::{NONE, Topology};
@@ -55,8 +56,8 @@ pub(crate) struct Shores {
 pub(crate) struct Motion<'a, const D: usize> {
     /// Velocities on faces.
     pub velocity: &'a [Vec<f64>; D],
-    /// g h: the square of the speed of a fall through a cell.
-    pub unit: f64,
+    /// −g h along each axis: the squares of the speeds of a fall through a cell, upwards.
+    pub falls: [f64; D],
 }
 
 impl<const D: usize> Motion<'_, D> {
@@ -72,7 +73,8 @@ impl<const D: usize> Motion<'_, D> {
                 }
             }
         }
-        let limit = SLOW * self.unit * mass;
+        let unit = self.falls.iter().fold(0.0, |sum, fall| sum + fall.abs());
+        let limit = SLOW * unit * mass;
         if square < limit {
             1.0 - square / limit
         } else {
@@ -143,7 +145,10 @@ impl Shores {
                 is_exact: miss <= EXACT,
             });
         }
-        for _ in 0..PASSES {
+        let mut up = [0.0; 3];
+        up[..D].copy_from_slice(&motion.falls);
+        for pass in 0..PASSES {
+            let is_first = pass == 0;
             self.next.clear();
             for shore in &self.cells {
                 if shore.is_exact {
@@ -162,8 +167,9 @@ impl Shores {
                     back[axis] = if side == 1 { -1.0 } else { 1.0 };
                     Some(seen_from(plane, back))
                 });
-                let at_hand = std::iter::once(shore.fitted).chain(beside);
                 let own = planes[shore.cell].unwrap_or(shore.plane);
+                let level = is_first.then(|| ground.holding(shore.cell, up, around.fraction()));
+                let at_hand = std::iter::once(shore.fitted).chain(beside).chain(level);
                 let found = ground.shore(&around, &own, at_hand, shore.rest);
                 self.next.push(found.unwrap_or(*shore));
             }
@@ -180,7 +186,7 @@ impl Shores {
         planes: &[Option<Plane>],
     ) {
         let is_dry = |at: usize| {
-            fractions[at] <= DUST
+            fractions[at] <= ACTIVE * ground.free[at]
                 && ground.free[at] > 0.0
                 && (ground.solid[at] > 0.0 || ground.wall[at] != [0.0; D])
         };

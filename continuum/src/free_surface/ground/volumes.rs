@@ -1,8 +1,9 @@
 //! Volume of a unit cell under two planes at once: what of the matter under a surface is ground.
 
 use crate::free_surface::plane::Plane;
+use crate::terrain::Strip;
 
-/// Most corners of a square cut by two lines.
+/// Most corners of a rectangle cut by two lines.
 const MOST_CORNERS: usize = 6;
 
 /// Volume of the unit cell under two planes.
@@ -38,21 +39,43 @@ fn is_above(plane: &Plane) -> bool {
 
 /// The same where neither plane leans to the third axis.
 fn common_area(one: &Plane, other: &Plane) -> f64 {
-    let mut corners = [[0.0; 2]; MOST_CORNERS];
-    corners[..4].copy_from_slice(&[[0.0, 0.0], [1.0, 0.0], [1.0, 1.0], [0.0, 1.0]]);
-    let mut count = 4;
-    for plane in [one, other] {
+    Polygon::CELL.under(one).under(other).area()
+}
+
+/// A convex polygon.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Polygon {
+    corners: [[f64; 2]; MOST_CORNERS],
+    count: usize,
+}
+
+impl Polygon {
+    /// A whole cell.
+    const CELL: Self = Self::between([0.0, 1.0]);
+
+    /// The part of a cell between two places along x.
+    const fn between([a, b]: [f64; 2]) -> Self {
+        let mut corners = [[0.0; 2]; MOST_CORNERS];
+        [corners[0], corners[1]] = [[a, 0.0], [b, 0.0]];
+        [corners[2], corners[3]] = [[b, 1.0], [a, 1.0]];
+        Self { corners, count: 4 }
+    }
+
+    /// The part of it that lies under a plane.
+    fn under(&self, plane: &Plane) -> Self {
         let depth = |[x, y]: [f64; 2]| plane.depth([x, y, 0.0]);
-        let mut left = [[0.0; 2]; MOST_CORNERS];
-        let mut kept = 0;
+        let mut left = Self {
+            corners: [[0.0; 2]; MOST_CORNERS],
+            count: 0,
+        };
         let mut keep = |corner: [f64; 2]| {
-            if let Some(slot) = left.get_mut(kept) {
+            if let Some(slot) = left.corners.get_mut(left.count) {
                 *slot = corner;
-                kept += 1;
+                left.count += 1;
             }
         };
-        for n in 0..count {
-            let (from, to) = (corners[n], corners[(n + 1) % count]);
+        for n in 0..self.count {
+            let (from, to) = (self.corners[n], self.corners[(n + 1) % self.count]);
             let (a, b) = (depth(from), depth(to));
             if a > 0.0 {
                 keep(from);
@@ -62,15 +85,46 @@ fn common_area(one: &Plane, other: &Plane) -> f64 {
                 keep([0, 1].map(|k| from[k] + part * (to[k] - from[k])));
             }
         }
-        corners = left;
-        count = kept;
+        left
     }
-    let mut twice = 0.0;
-    for n in 1..count.saturating_sub(1) {
-        let [a, b] = [corners[n], corners[n + 1]].map(|c| [0, 1].map(|k| c[k] - corners[0][k]));
-        twice += a[0] * b[1] - a[1] * b[0];
+
+    fn area(&self) -> f64 {
+        let corners = &self.corners[..self.count];
+        let mut twice = 0.0;
+        for pair in corners.windows(2).skip(1) {
+            let [a, b] = [pair[0], pair[1]].map(|c| [0, 1].map(|k| c[k] - corners[0][k]));
+            twice += a[0] * b[1] - a[1] * b[0];
+        }
+        0.5 * twice
     }
-    0.5 * twice
+}
+
+/// Ground in a cell within which its surface bends: what lies under each of its pieces, with a sign.
+#[derive(Debug, Clone, PartialEq, Default)]
+pub(super) struct Bend(Vec<(Polygon, f64)>);
+
+impl Bend {
+    /// Of the strips of one cell.
+    pub(super) fn of(strips: &[Strip]) -> Self {
+        let parts = strips.iter().map(|strip| {
+            let [[a, b], [low, high]] = [strip.ends, strip.heights];
+            let normal = [low - high, b - a, 0.0];
+            let piece = Plane {
+                normal,
+                offset: normal[0] * a + normal[1] * low,
+            };
+            (Polygon::between([a, b]).under(&piece), strip.sign)
+        });
+        Self(parts.filter(|(polygon, _)| polygon.count > 0).collect())
+    }
+
+    /// Volume of it under a plane.
+    pub(super) fn under(&self, plane: &Plane) -> f64 {
+        let parts = self.0.iter();
+        parts
+            .map(|(polygon, sign)| sign * polygon.under(plane).area())
+            .sum()
+    }
 }
 
 fn common_volume_in_space(one: &Plane, other: &Plane) -> f64 {
