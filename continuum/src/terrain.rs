@@ -11,6 +11,7 @@
 //! Nothing is sampled, overhangs need no special case, and per cell the free parts of the faces and the
 //! wall close to a vector of zero to round-off.
 
+mod bends;
 mod heights;
 mod nearest;
 mod profile;
@@ -18,6 +19,7 @@ mod raster;
 mod section;
 mod surface;
 
+pub use bends::{Shape, Under};
 pub use heights::HeightSum;
 pub use profile::Profile;
 pub use raster::HeightRaster;
@@ -36,25 +38,9 @@ pub trait Relief<const N: usize> {
     /// The distance of points of a grid from the ground's surface (m); what lies far off may count as some cells away.
     fn distances(&self, lines: &GridLines<N>) -> impl Fn([f64; N]) -> f64;
 
-    /// The ground in cells within which its surface bends, in the order of the cells, where it is known piece by piece; in others
-    /// a plane says where it lies.
-    fn bends(&self, _: &GridLines<N>) -> Vec<Strip> {
-        Vec::new()
-    }
-}
-
-/// What lies under a straight piece of the ground's line within a cell, in the cell's coordinates from 0 to 1. The ground is the sum over its
-/// pieces, with their signs.
-#[derive(Debug, Clone, Copy, PartialEq)]
-pub struct Strip {
-    /// Number of the cell.
-    pub cell: usize,
-    /// From where to where it reaches along x,
-    pub ends: [f64; 2],
-    /// and its height there.
-    pub heights: [f64; 2],
-    /// 1, or −1 under a soffit.
-    pub sign: f64,
+    /// The ground in cells within which its surface bends, piece by piece and in the order of the cells; in others a plane says
+    /// where it lies.
+    fn bends(&self, lines: &GridLines<N>) -> Vec<Under>;
 }
 
 impl Relief<2> for Profile {
@@ -66,7 +52,7 @@ impl Relief<2> for Profile {
         |point| self.distance(point)
     }
 
-    fn bends(&self, lines: &GridLines<2>) -> Vec<Strip> {
+    fn bends(&self, lines: &GridLines<2>) -> Vec<Under> {
         Profile::bends(self, lines)
     }
 }
@@ -80,6 +66,10 @@ impl Relief<3> for Surface {
     fn distances(&self, lines: &GridLines<3>) -> impl Fn([f64; 3]) -> f64 {
         let nearest = nearest::Nearest::new(self, lines);
         move |point| nearest.distance(point)
+    }
+
+    fn bends(&self, lines: &GridLines<3>) -> Vec<Under> {
+        Surface::bends(self, lines)
     }
 }
 

@@ -173,6 +173,17 @@ fn pressure_at_shores_of_curved_ground() {
     }
 }
 
+/// Random numbers from 0 to 1.
+fn numbers(seed: u64) -> impl FnMut() -> f64 {
+    let mut state = seed;
+    move || {
+        state = state
+            .wrapping_mul(6_364_136_223_846_793_005)
+            .wrapping_add(1_442_695_040_888_963_407);
+        (state >> 33) as f64 / f64::from(1_u32 << 31)
+    }
+}
+
 /// Ground of kinks at random heights, with slopes up to 2.7, islands and ridges narrower than a cell among them. (With a plane of ground in each cell the pressure beside kinks 3.7 cells apart was up to 50 % off and
 /// matter moved.)
 #[test]
@@ -180,13 +191,7 @@ fn pressure_at_shores_among_kinks() {
     for spacing in [1.3, 2.3, 3.7] {
         let mut worst = [0.0_f64; 3];
         for seed in 0..12_u64 {
-            let mut state = 17 + 1000 * seed + (10.0 * spacing) as u64;
-            let mut random = || {
-                state = state
-                    .wrapping_mul(6_364_136_223_846_793_005)
-                    .wrapping_add(1_442_695_040_888_963_407);
-                (state >> 33) as f64 / f64::from(1_u32 << 31)
-            };
+            let mut random = numbers(17 + 1000 * seed + (10.0 * spacing) as u64);
             let points = (0..(70.0 / spacing) as u32)
                 .map(|n| [spacing * f64::from(n) - 20.0, 2.0 + 3.5 * random()]);
             let level = 4.05 + 0.3 * (seed % 4) as f64;
@@ -204,92 +209,121 @@ fn pressure_at_shores_among_kinks() {
     }
 }
 
-/// The part of a convex polygon in the plane where a linear function is positive.
-fn clipped(polygon: &[[f64; 2]], function: impl Fn([f64; 2]) -> f64) -> Vec<[f64; 2]> {
+/// The part of a convex polygon in space above a level, or below it.
+fn clipped(polygon: &[[f64; 3]], level: f64, above: bool) -> Vec<[f64; 3]> {
+    let height = |corner: [f64; 3]| (corner[2] - level) * if above { 1.0 } else { -1.0 };
     let mut left = Vec::new();
     for (n, &from) in polygon.iter().enumerate() {
         let to = polygon[(n + 1) % polygon.len()];
-        let (a, b) = (function(from), function(to));
+        let (a, b) = (height(from), height(to));
         if a > 0.0 {
             left.push(from);
         }
         if (a > 0.0) != (b > 0.0) {
-            left.push([0, 1].map(|k| from[k] + a / (a - b) * (to[k] - from[k])));
+            left.push(std::array::from_fn(|k| {
+                from[k] + a / (a - b) * (to[k] - from[k])
+            }));
         }
     }
     left
+}
+
+/// The higher one of ground and a level.
+fn with_level(ground: &Surface, level: f64) -> Surface {
+    let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+    for corners in ground.triangles() {
+        let triangle = corners.map(|c| ground.vertices()[c]);
+        for above in [true, false] {
+            let mut part = clipped(&triangle, level, above);
+            if !above {
+                part.iter_mut().for_each(|corner| corner[2] = level);
+            }
+            let first = vertices.len();
+            triangles.extend((2..part.len()).map(|n| [first, first + n - 1, first + n]));
+            vertices.extend(part);
+        }
+    }
+    Surface::new(vertices, triangles).unwrap()
+}
+
+/// What a pond in space over ground misses, ten cells by eight.
+fn pond_in_space(ground: &Surface, level: f64) -> [f64; 3] {
+    let cells = [10, 8, 7];
+    let lines = GridLines {
+        origin: [0.0; 3],
+        spacing: [1.0; 3],
+        cells,
+    };
+    let surface = with_level(ground, level);
+    let [under, below] = [ground, &surface].map(|s| s.cut(&lines, false).unwrap());
+    let fractions = (0..cells.iter().product()).map(|n: usize| {
+        let index = [
+            n % cells[0],
+            n / cells[0] % cells[1],
+            n / (cells[0] * cells[1]),
+        ];
+        (under.volume_fraction(index) - below.volume_fraction(index)).max(0.0)
+    });
+    let [x, y, z] = cells;
+    let axes = [
+        cells_long(x, SMOOTH),
+        cells_long(y, SMOOTH),
+        cells_long(z, ROUGH),
+    ];
+    let terrain = Terrain {
+        shape: ground.clone(),
+        origin: [0.0; 3],
+        contact: Contact::NoSlip,
+        rise: [0; 3],
+    };
+    let mut flow: SpaceFlow<MuI> = SpaceFlow::over_ground(
+        Grid::with_moving_surface(axes).unwrap(),
+        &terrain,
+        fractions.collect(),
+        grains(),
+        [0.0, 0.0, -1.0],
+        precise(),
+    )
+    .unwrap();
+    for _ in 0..3 {
+        flow.step(f64::INFINITY).unwrap();
+    }
+    let row = cells[0] * cells[1];
+    misses(&flow.state().pressure, row, level, flow.max_speed())
 }
 
 /// In space: a level surface over an incline oblique to the grid.
 #[test]
 fn pressure_at_shores_in_space() {
     for (slope, level) in [([0.5, 0.3], 3.8), ([0.5, 0.3], 3.3), ([0.4, -0.9], 3.55)] {
-        let cells = [10, 8, 7];
         let height = |[x, y]: [f64; 2]| 2.6 + slope[0] * (x - 5.0) + slope[1] * (y - 4.0);
         let square = [[-2.0, -2.0], [12.0, -2.0], [12.0, 12.0], [-2.0, 12.0]];
-        // The higher one of level and ground.
-        let pieces = [
-            (clipped(&square, |at| level - height(at)), false),
-            (clipped(&square, |at| height(at) - level), true),
-        ];
-        let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
-        for (piece, is_ground) in pieces {
-            let first = vertices.len();
-            vertices.extend(piece.iter().map(|&[x, y]| {
-                let z = if is_ground { height([x, y]) } else { level };
-                [x, y, z]
-            }));
-            triangles.extend((2..piece.len()).map(|n| [first, first + n - 1, first + n]));
-        }
-        let surface = Surface::new(vertices, triangles).unwrap();
         let corners = square.map(|at| [at[0], at[1], height(at)]).to_vec();
         let ground = Surface::new(corners, vec![[0, 1, 2], [0, 2, 3]]).unwrap();
-        let lines = GridLines {
-            origin: [0.0; 3],
-            spacing: [1.0; 3],
-            cells,
-        };
-        let [under, below] = [&ground, &surface].map(|s| s.cut(&lines, false).unwrap());
-        let fractions = (0..cells.iter().product()).map(|n: usize| {
-            let index = [
-                n % cells[0],
-                n / cells[0] % cells[1],
-                n / (cells[0] * cells[1]),
-            ];
-            (under.volume_fraction(index) - below.volume_fraction(index)).max(0.0)
+        let [miss, relative, speed] = pond_in_space(&ground, level);
+        println!("{slope:?} {level}: {miss:e} {relative:e} {speed:e}");
+        assert!(relative < 1e-9 && miss < 1e-9 && speed < 1e-6 * DIAMETER.sqrt());
+    }
+}
+
+/// In space: facets of random heights, with slopes up to 1.4. (Where they are 1.7 cells wide, steeper than 2 and leave pores within cells
+/// the pressure of one of four ponds is exact; the others miss by 0.1, 7 and 27 % in the worst cell.)
+#[test]
+fn pressure_at_shores_among_facets() {
+    const WIDTH: f64 = 3.1;
+    const COUNT: usize = 5;
+    for seed in 0..4_u32 {
+        let mut random = numbers(60 + 1000 * u64::from(seed));
+        let vertices = (0..COUNT * COUNT).map(|n| {
+            let [x, y] = [n % COUNT, n / COUNT].map(|i| WIDTH * i as f64 - 2.0);
+            [x, y, 1.5 + 3.0 * random()]
         });
-        let [x, y, z] = cells;
-        let axes = [
-            cells_long(x, SMOOTH),
-            cells_long(y, SMOOTH),
-            cells_long(z, ROUGH),
-        ];
-        let terrain = Terrain {
-            shape: ground.clone(),
-            origin: [0.0; 3],
-            contact: Contact::NoSlip,
-            rise: [0; 3],
-        };
-        let mut flow: SpaceFlow<MuI> = SpaceFlow::over_ground(
-            Grid::with_moving_surface(axes).unwrap(),
-            &terrain,
-            fractions.collect(),
-            grains(),
-            [0.0, 0.0, -1.0],
-            precise(),
-        )
-        .unwrap();
-        for _ in 0..3 {
-            flow.step(f64::INFINITY).unwrap();
-        }
-        let found = misses(
-            &flow.state().pressure,
-            cells[0] * cells[1],
-            level,
-            flow.max_speed(),
-        );
-        println!("{slope:?} {level}: {found:?}");
-        let [miss, relative, speed] = found;
+        let squares = (0..COUNT * COUNT).filter(|n| (n + 1) % COUNT > 0 && n / COUNT + 1 < COUNT);
+        let triangles =
+            squares.flat_map(|n| [[n, n + 1, n + COUNT + 1], [n, n + COUNT + 1, n + COUNT]]);
+        let ground = Surface::new(vertices.collect(), triangles.collect()).unwrap();
+        let [miss, relative, speed] = pond_in_space(&ground, 3.15 + 0.3 * f64::from(seed));
+        println!("{seed}: {miss:.2e} {relative:.2e} {speed:.1e}");
         assert!(relative < 1e-9 && miss < 1e-9 && speed < 1e-6 * DIAMETER.sqrt());
     }
 }

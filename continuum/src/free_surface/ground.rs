@@ -228,11 +228,11 @@ impl<const D: usize> Ground<D> {
                 ground.planes[cell] = Some(Plane::of_fraction(normal, solid));
             }
         }
-        let strips = terrain.shape.bends(&lines);
-        let cells = strips.chunk_by(|a, b| a.cell == b.cell);
-        ground.bends = cells
-            .filter(|strips| ground.planes[strips[0].cell].is_some())
-            .map(|strips| (strips[0].cell, Bend::of(strips)))
+        let pieces = terrain.shape.bends(&lines);
+        let by_cell = pieces.chunk_by(|a, b| a.cell == b.cell);
+        ground.bends = by_cell
+            .filter(|pieces| ground.planes[pieces[0].cell].is_some())
+            .map(|pieces| (pieces[0].cell, Bend::of(pieces)))
             .collect();
         Ok(ground)
     }

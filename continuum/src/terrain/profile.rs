@@ -1,17 +1,14 @@
 //! Ground in the plane, as a line.
 
-use super::{CutCells, GridLines, Strip, require_positions};
+use super::{CutCells, GridLines, require_positions};
 use crate::error::{Error, require};
-
-/// Pieces whose directions differ by a smaller angle are one.
-const STRAIGHT: f64 = 1e-9;
 
 /// The surface of ground in the plane (x, z): a line of straight pieces with the ground on its right
 /// hand, that is below it where it runs towards larger x. It may turn back under itself, as an
 /// overhang does, but must not cross itself. Ground reaches down without end.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Profile {
-    points: Vec<[f64; 2]>,
+    pub(super) points: Vec<[f64; 2]>,
 }
 
 impl Profile {
@@ -134,71 +131,11 @@ impl Profile {
         }
         Ok(cut.finish())
     }
-
-    /// What lies under the pieces of the line in cells through which two of different directions go.
-    pub(super) fn bends(&self, lines: &GridLines<2>) -> Vec<Strip> {
-        let mut points = lines.local(&self.points);
-        lines.snap(&mut points);
-        let mut bends = vec![false; lines.count()];
-        let mut directions: Vec<Option<[f64; 2]>> = vec![None; lines.count()];
-        for_pieces(lines, &points, |cell, piece, low, high| {
-            let [from, to] = piece;
-            let is_inside = |axis: usize| from[axis] > low[axis] && from[axis] < high[axis];
-            if share_within(piece, [low, high], is_inside).is_none() {
-                return;
-            }
-            let direction = [to[0] - from[0], to[1] - from[1]];
-            let length = direction[0].hypot(direction[1]);
-            let direction = direction.map(|d| d / length);
-            let [x, z] = *directions[cell].get_or_insert(direction);
-            bends[cell] |= (x * direction[1] - z * direction[0]).abs() > STRAIGHT;
-        });
-        let mut strips = Vec::new();
-        for_pieces(lines, &points, |cell, [from, to], low, high| {
-            let (left, right) = if to[0] >= from[0] {
-                (from, to)
-            } else {
-                (to, from)
-            };
-            let [a, b] = [left[0].max(low[0]), right[0].min(high[0])];
-            if !bends[cell] || b <= a {
-                return;
-            }
-            let slope = (right[1] - left[1]) / (right[0] - left[0]);
-            let size = [high[0] - low[0], high[1] - low[1]];
-            strips.push(Strip {
-                cell,
-                ends: [a, b].map(|x| (x - low[0]) / size[0]),
-                heights: [a, b].map(|x| (left[1] + slope * (x - left[0]) - low[1]) / size[1]),
-                sign: if to[0] > from[0] { 1.0 } else { -1.0 },
-            });
-        });
-        strips.sort_by_key(|strip| strip.cell);
-        strips
-    }
-}
-
-/// Calls for each piece of a line and each cell of the columns that it reaches, with the cell's corners.
-fn for_pieces(
-    lines: &GridLines<2>,
-    points: &[[f64; 2]],
-    mut call: impl FnMut(usize, [[f64; 2]; 2], [f64; 2], [f64; 2]),
-) {
-    for piece in points.windows(2) {
-        let (from, to) = (piece[0], piece[1]);
-        for i in lines.reach(0, from[0].min(to[0]), from[0].max(to[0])) {
-            for k in 0..lines.cells[1] {
-                let [low, high] =
-                    [0, 1].map(|n| [lines.local_line(0, i + n), lines.local_line(1, k + n)]);
-                call(lines.number([i, k], None), [from, to], low, high);
-            }
-        }
-    }
 }
 
 /// From which to which part of its length a piece lies in a box, if for more than a point. `is_beside` says whether one
 /// that runs across an axis counts.
-fn share_within(
+pub(super) fn share_within(
     [from, to]: [[f64; 2]; 2],
     [low, high]: [[f64; 2]; 2],
     is_beside: impl Fn(usize) -> bool,

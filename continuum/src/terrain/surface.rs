@@ -1,5 +1,6 @@
 //! Ground in space, as a surface of triangles.
 
+use super::bends::for_columns;
 use super::profile::area_below;
 use super::{CutCells, GridLines, require_positions};
 use crate::error::{Error, require};
@@ -11,8 +12,8 @@ use crate::error::{Error, require};
 /// to meet it with the ground below first.
 #[derive(Debug, Clone, PartialEq)]
 pub struct Surface {
-    vertices: Vec<[f64; 3]>,
-    triangles: Vec<[usize; 3]>,
+    pub(super) vertices: Vec<[f64; 3]>,
+    pub(super) triangles: Vec<[usize; 3]>,
 }
 
 impl Surface {
@@ -77,7 +78,7 @@ impl Surface {
     }
 }
 
-fn span(polygon: &[[f64; 3]], axis: usize) -> [f64; 2] {
+pub(super) fn span(polygon: &[[f64; 3]], axis: usize) -> [f64; 2] {
     polygon
         .iter()
         .fold([f64::INFINITY, f64::NEG_INFINITY], |[low, high], corner| {
@@ -110,7 +111,7 @@ pub(super) fn clip(polygon: &[[f64; 3]], axis: usize, at: f64, above: bool) -> V
 }
 
 /// Area vector ½ Σ a × b and centre of a plane polygon.
-fn area_vector(polygon: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
+pub(super) fn area_vector(polygon: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
     let (mut vector, mut moment, mut total) = ([0.0; 3], [0.0; 3], 0.0);
     for n in 1..polygon.len().saturating_sub(1) {
         let [o, p, q] = [polygon[0], polygon[n], polygon[n + 1]];
@@ -137,7 +138,7 @@ fn area_vector(polygon: &[[f64; 3]]) -> ([f64; 3], [f64; 3]) {
 
 /// Area of the polygon's shadow on the plane z = 0, positive if it faces upwards, and the volume
 /// between the polygon and the height z.
-fn shadow(polygon: &[[f64; 3]], z: f64) -> [f64; 2] {
+pub(super) fn shadow(polygon: &[[f64; 3]], z: f64) -> [f64; 2] {
     let (mut area, mut volume) = (0.0, 0.0);
     for n in 1..polygon.len().saturating_sub(1) {
         let [o, p, q] = [polygon[0], polygon[n], polygon[n + 1]];
@@ -151,19 +152,10 @@ fn shadow(polygon: &[[f64; 3]], z: f64) -> [f64; 2] {
 /// Ground below one triangle, in all cells.
 fn add_triangle(cut: &mut CutCells<3>, triangle: &[[f64; 3]; 3]) {
     let lines = cut.lines;
-    let [across_x, across_y] = [0, 1].map(|axis| span(triangle, axis));
     let facing = shadow(triangle, 0.0)[0];
-    for i in lines.reach(0, across_x[0], across_x[1]) {
-        let [x0, x1] = [lines.local_line(0, i), lines.local_line(0, i + 1)];
-        let strip = clip(&clip(triangle, 0, x0, true), 0, x1, false);
-        for j in lines.reach(1, across_y[0], across_y[1]) {
-            let [y0, y1] = [lines.local_line(1, j), lines.local_line(1, j + 1)];
-            let column = clip(&clip(&strip, 1, y0, true), 1, y1, false);
-            if column.len() >= 3 {
-                add_column(cut, [i, j], &column, triangle);
-            }
-        }
-    }
+    for_columns(&lines, triangle, |index, column| {
+        add_column(cut, index, column, triangle);
+    });
     if facing == 0.0 {
         return;
     }

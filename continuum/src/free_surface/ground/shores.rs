@@ -9,8 +9,11 @@
 //! V(under the plane) − V(under the plane and under the ground).
 //! ```
 //!
-//! Gauss's and Newton's method turns it from the best one of the planes at hand, those of the cell and of the cells beside it. No
-//! direction is preferred: a plane surface is found exactly, level or not, up to the last cell of the shore.
+//! Gauss's and Newton's method turns it from the best one of the planes at hand: those of the cell and of the cells beside it, and a level
+//! one. Only the misses decide: a plane surface is found exactly, level or not, up to the last cell of the shore. Ground that bends within a
+//! cell is taken piece by piece ([`Bend`](super::volumes::Bend)), so that this holds over any broken line and any triangles, on both
+//! sides of a ridge within a cell as well. Where parts of a cell have no way to each other one fraction cannot tell how full each
+//! is.
 //!
 //! It counts as far as it fits and as far as the matter is at rest, w between 0 and 1:
 //!
@@ -37,7 +40,8 @@ const PASSES: usize = 2;
 const FITS: [f64; 2] = [1e-4, 1e-3];
 /// Square of the speed, over g h, beyond which matter is not at rest.
 const SLOW: f64 = 0.01;
-/// How far from dry ground shores are looked for, in cells: a layer half a cell thick ends within them on slopes of 0.07 and more.
+/// How far from ground without an active cell above it shores are looked for, in cells: a layer half a cell thick ends within them on
+/// slopes of 0.07 and more.
 const REACH: usize = 8;
 /// Less ground than this part of a cell does not stand out of matter.
 pub(super) const STANDS_OUT: f64 = 1e-9;
@@ -47,7 +51,7 @@ pub(super) const STANDS_OUT: f64 = 1e-9;
 pub(crate) struct Shores {
     cells: Vec<Shore>,
     next: Vec<Shore>,
-    /// Whether dry ground lies within [`REACH`] of a cell with matter, and within one cell less.
+    /// Whether such ground lies within [`REACH`] of a cell with matter, and within one cell less.
     is_near: Vec<bool>,
     is_nearer: Vec<bool>,
 }
@@ -177,7 +181,7 @@ impl Shores {
         }
     }
 
-    /// Notes which cells with a surface lie near dry ground.
+    /// Notes which cells with a surface lie near ground that is dry, or nearly: an island may be narrower than a cell.
     fn mark<const D: usize>(
         &mut self,
         ground: &Ground<D>,

@@ -1,7 +1,7 @@
 //! Volume of a unit cell under two planes at once: what of the matter under a surface is ground.
 
 use crate::free_surface::plane::Plane;
-use crate::terrain::Strip;
+use crate::terrain::{Shape, Under};
 
 /// Most corners of a rectangle cut by two lines.
 const MOST_CORNERS: usize = 6;
@@ -101,29 +101,82 @@ impl Polygon {
 
 /// Ground in a cell within which its surface bends: what lies under each of its pieces, with a sign.
 #[derive(Debug, Clone, PartialEq, Default)]
-pub(super) struct Bend(Vec<(Polygon, f64)>);
+pub(super) struct Bend {
+    polygons: Vec<(Polygon, f64)>,
+    prisms: Vec<Prism>,
+}
 
 impl Bend {
-    /// Of the strips of one cell.
-    pub(super) fn of(strips: &[Strip]) -> Self {
-        let parts = strips.iter().map(|strip| {
-            let [[a, b], [low, high]] = [strip.ends, strip.heights];
-            let normal = [low - high, b - a, 0.0];
-            let piece = Plane {
-                normal,
-                offset: normal[0] * a + normal[1] * low,
-            };
-            (Polygon::between([a, b]).under(&piece), strip.sign)
-        });
-        Self(parts.filter(|(polygon, _)| polygon.count > 0).collect())
+    /// Of the pieces of one cell.
+    pub(super) fn of(pieces: &[Under]) -> Self {
+        let mut bend = Self::default();
+        for piece in pieces {
+            match piece.shape {
+                Shape::Line([from, to]) => {
+                    let normal = [from[1] - to[1], to[0] - from[0], 0.0];
+                    let line = Plane {
+                        normal,
+                        offset: normal[0] * from[0] + normal[1] * from[1],
+                    };
+                    let polygon = Polygon::between([from[0], to[0]]).under(&line);
+                    if polygon.count > 0 {
+                        bend.polygons.push((polygon, piece.sign));
+                    }
+                }
+                Shape::Triangle(top) => bend.prisms.push(Prism::under_triangle(top, piece.sign)),
+            }
+        }
+        bend
     }
 
     /// Volume of it under a plane.
     pub(super) fn under(&self, plane: &Plane) -> f64 {
-        let parts = self.0.iter();
-        parts
+        let polygons = self.polygons.iter();
+        let areas: f64 = polygons
             .map(|(polygon, sign)| sign * polygon.under(plane).area())
-            .sum()
+            .sum();
+        let volumes: f64 = self.prisms.iter().map(|prism| prism.under(plane)).sum();
+        areas + volumes
+    }
+}
+
+/// What lies between a triangle and the floor of its cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Prism {
+    top: [[f64; 3]; 3],
+    /// With its sign.
+    volume: f64,
+}
+
+impl Prism {
+    fn under_triangle(top: [[f64; 3]; 3], sign: f64) -> Self {
+        let mut prism = Self { top, volume: 1.0 };
+        let parts = prism.tetrahedra().map(|part| volume_under(&part, &[]));
+        prism.volume = sign * parts.iter().sum::<f64>();
+        prism
+    }
+
+    fn tetrahedra(&self) -> [[[f64; 3]; 4]; 3] {
+        let [a, b, c] = self.top.map(|[x, y, _]| [x, y, 0.0]);
+        let [d, e, f] = self.top;
+        [[a, b, c, d], [b, c, d, e], [c, d, e, f]]
+    }
+
+    /// The volume under a plane, with its sign.
+    fn under(&self, plane: &Plane) -> f64 {
+        let ends = self.top.map(|corner| {
+            let [x, y, _] = corner;
+            [plane.depth(corner), plane.depth([x, y, 0.0])]
+        });
+        if ends.iter().flatten().all(|depth| *depth >= 0.0) {
+            return self.volume;
+        }
+        if ends.iter().flatten().all(|depth| *depth <= 0.0) {
+            return 0.0;
+        }
+        let parts = self.tetrahedra();
+        let sum: f64 = parts.iter().map(|part| volume_under(part, &[plane])).sum();
+        sum.copysign(self.volume)
     }
 }
 
