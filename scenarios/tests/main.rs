@@ -26,6 +26,7 @@ mod malformed;
 mod open_chute;
 mod own_scenes;
 mod packings;
+mod recipes;
 mod restart;
 mod scenes;
 mod sheared;
