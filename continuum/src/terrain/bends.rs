@@ -44,9 +44,11 @@ impl Profile {
             }
             let direction = [to[0] - from[0], to[1] - from[1]];
             let length = direction[0].hypot(direction[1]);
+            if length == 0.0 {
+                return;
+            }
             let direction = direction.map(|d| d / length);
-            let [x, z] = *directions[cell].get_or_insert(direction);
-            bends[cell] |= (x * direction[1] - z * direction[0]).abs() > STRAIGHT;
+            bends[cell] |= differ(directions[cell].get_or_insert(direction), &direction);
         });
         let mut all = Vec::new();
         for_pieces(lines, &points, |cell, [from, to], low, high| {
@@ -74,6 +76,12 @@ impl Profile {
         all.sort_by_key(|under: &Under| under.cell);
         all
     }
+}
+
+/// Whether two directions differ. Opposite ones do: a roof and its soffit.
+fn differ<const N: usize>(one: &[f64; N], other: &[f64; N]) -> bool {
+    let mut pairs = one.iter().zip(other);
+    pairs.any(|(a, b)| (a - b).abs() > STRAIGHT)
 }
 
 /// Calls for each piece of a line and each cell of the columns that it reaches, with the cell's corners.
@@ -124,11 +132,7 @@ impl Surface {
                         continue;
                     }
                     let cell = lines.number([i, j, k], None);
-                    let other = normals[cell].get_or_insert(normal);
-                    let along: f64 = other.iter().zip(normal).map(|(a, b)| a * b).sum();
-                    let apart = std::array::from_fn(|a| normal[a] - along * other[a]);
-                    let apart: [f64; 3] = apart;
-                    bends[cell] |= apart.iter().any(|a| a.abs() > STRAIGHT);
+                    bends[cell] |= differ(normals[cell].get_or_insert(normal), &normal);
                 }
             });
         }

@@ -257,6 +257,7 @@ fn volume_under(corners: &[[f64; 3]; 4], planes: &[&Plane]) -> f64 {
 #[cfg(test)]
 mod tests {
     use super::*;
+    use crate::terrain::{GridLines, Profile, Relief, Surface};
 
     /// Under one plane twice there is what is under it; under a plane and its other side nothing; a level plane
     /// and an upright one cut off a box, two slanted ones what integration says.
@@ -282,5 +283,63 @@ mod tests {
         // Under y = 0.4 and y = x: ∫ min(x, 0.4) dx.
         let slanted = plane([-1.0, 1.0, 0.0], 0.5);
         assert!((common_volume(&level, &slanted) - (0.08 + 0.24)).abs() < 1e-15);
+    }
+
+    /// Pieces of ground in a cell add up to what cut cells say, under a roof as well, and a plane that cuts all of them
+    /// off takes the part that integration says.
+    #[test]
+    fn pieces_of_ground_add_up() {
+        let lines = GridLines {
+            origin: [0.0; 2],
+            spacing: [1.0, 0.5],
+            cells: [4, 6],
+        };
+        // A valley, then a nose that hangs over.
+        let points = vec![
+            [-1.0, 2.0],
+            [0.7, 0.3],
+            [1.6, 1.2],
+            [2.9, 2.6],
+            [2.3, 0.9],
+            [2.3, 0.8],
+            [5.0, 0.6],
+        ];
+        let profile = Profile::new(points).unwrap();
+        let cut = profile.cut(&lines).unwrap();
+        let pieces = profile.bends(&lines);
+        let mut bent = 0;
+        let all = Plane::of_fraction([0.0, 1.0, 0.0], 1.0);
+        for pieces in pieces.chunk_by(|a, b| a.cell == b.cell) {
+            let index = [pieces[0].cell % 4, pieces[0].cell / 4];
+            let solid = 1.0 - cut.volume_fraction(index);
+            let found = Bend::of(pieces).under(&all);
+            assert!((found - solid).abs() < 1e-14, "{index:?} {found} {solid}");
+            bent += 1;
+        }
+        assert!(bent >= 4, "{bent}");
+        // A wedge of two triangles in space, 0.6 high over the middle of x: under z = 0.3 there is ∫ min(h, 0.3).
+        let at = |x: f64, y: f64, z: f64| [x, y, z];
+        let ground = Surface::new(
+            vec![
+                at(0.0, 0.0, 0.0),
+                at(0.5, 0.0, 0.6),
+                at(1.0, 0.0, 0.0),
+                at(0.0, 1.0, 0.0),
+                at(0.5, 1.0, 0.6),
+                at(1.0, 1.0, 0.0),
+            ],
+            vec![[0, 1, 4], [0, 4, 3], [1, 2, 5], [1, 5, 4]],
+        )
+        .unwrap();
+        let lines = GridLines {
+            origin: [0.0; 3],
+            spacing: [1.0; 3],
+            cells: [1; 3],
+        };
+        let bend = Bend::of(&ground.bends(&lines));
+        let level = |z| Plane::of_fraction([0.0, 0.0, 1.0], z);
+        for (plane, exact) in [(level(1.0), 0.3), (level(0.3), 0.225), (level(0.6), 0.3)] {
+            assert!((bend.under(&plane) - exact).abs() < 1e-15);
+        }
     }
 }
