@@ -127,6 +127,23 @@ fn chutes_are_planned_and_bad_ones_refused_by_key() {
         );
         assert!(!folder.path().join("x").exists());
     }
+    let high = colluvium(
+        folder.path(),
+        &[
+            "check",
+            "open-chute",
+            "--set",
+            "in_space={breadth=0.1,cells=30}",
+            "--set",
+            "grid.room_scaled=100",
+        ],
+    );
+    let message = String::from_utf8_lossy(&high.stderr).into_owned();
+    assert_eq!(high.status.code(), Some(2), "{message}");
+    assert!(
+        message.contains("grid.room_scaled") && message.contains("at most 400000 cells"),
+        "{message}"
+    );
     let both = [
         "run",
         "open-chute",

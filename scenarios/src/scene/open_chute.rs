@@ -116,6 +116,8 @@ pub(super) const INFLOWS: &[&str] = &["inflow.bagnold_factor", "inflow.speed"];
 const LARGEST_CHUTE: f64 = 200_000.0;
 /// The same in space.
 const LARGEST_IN_SPACE: f64 = 40_000.0;
+/// Most cells of the grid over those that may hold material.
+const LARGEST_ROOM: f64 = 10.0;
 
 impl OpenChuteScene {
     /// Cells across the depth at this scale.
@@ -158,6 +160,18 @@ impl OpenChuteScene {
                 format!(
                     "at most {most} cells in the chute, here {filled:.0} at scale {} and grid.length_scaled = {}",
                     self.scale, self.grid.length_scaled
+                ),
+            ));
+        }
+        let all = filled * self.grid.room_scaled;
+        if all > LARGEST_ROOM * most {
+            return Err(out_of_range(
+                origin,
+                "grid.room_scaled",
+                self.grid.room_scaled.to_string(),
+                format!(
+                    "at most {} cells in the grid, here {all:.0}",
+                    LARGEST_ROOM * most
                 ),
             ));
         }
