@@ -138,10 +138,17 @@ fn with_crossings(points: &[[f64; 2]], level: f64) -> Vec<[f64; 2]> {
     all
 }
 
-/// The same over a line of ground with a level surface, which ends where it meets the ground.
+/// The same over a line of ground with a level surface, which ends where it meets the ground, or with one that rises by a part of
+/// its way, which is not at rest.
 fn level_pond(points: Vec<[f64; 2]>, level: f64) -> [f64; 3] {
+    tilted_pond(points, level, 0.0)
+}
+
+fn tilted_pond(points: Vec<[f64; 2]>, level: f64, rise: f64) -> [f64; 3] {
     let surface = with_crossings(&points, level);
-    let surface = surface.into_iter().map(|[x, z]| [x, z.max(level)]);
+    let surface = surface
+        .into_iter()
+        .map(|[x, z]| [x, z.max(level + rise * (x - 12.0))]);
     let surface = Profile::new(surface.collect()).unwrap();
     pond_under(&surface, &Profile::new(points).unwrap(), level)
 }
@@ -201,6 +208,13 @@ fn pressure_at_shores_among_kinks() {
         }
         let [miss, relative, speed] = worst;
         println!("{spacing}: {miss:.2e} {relative:.2e} {speed:.1e}");
+        // A surface that rises by a fiftieth has not the pressure of a level one: negative control.
+        let mut random = numbers(17);
+        let points = (0..(70.0 / spacing) as u32)
+            .map(|n| [spacing * f64::from(n) - 20.0, 2.0 + 3.5 * random()]);
+        let [control, ..] = tilted_pond(points.collect(), 4.35, 0.02);
+        println!("rising: {control:e}");
+        assert!(control > 1e-3, "{control:e}");
         assert!(
             miss < 1e-9 && relative < 1e-9,
             "{spacing} {miss:e} {relative:e}"

@@ -141,7 +141,8 @@ fn chutes_are_planned_and_bad_ones_refused_by_key() {
     let message = String::from_utf8_lossy(&high.stderr).into_owned();
     assert_eq!(high.status.code(), Some(2), "{message}");
     assert!(
-        message.contains("grid.room_scaled") && message.contains("at most 400000 cells"),
+        message.contains("grid.room_scaled")
+            && message.contains("at most 13.021 here: 400000 cells"),
         "{message}"
     );
     let both = [

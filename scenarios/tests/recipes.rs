@@ -21,10 +21,20 @@ fn words(line: &str) -> Vec<String> {
     words
 }
 
-/// Every scene that a recipe runs or calibrates is a good one with the keys it sets.
+/// What an option and its value set; of values that vary the first one.
+fn key_and_value(pair: &[String]) -> Option<String> {
+    match pair[0].as_str() {
+        "--set" => Some(pair[1].clone()),
+        "--vary" => pair[1].split(',').next().map(str::to_owned),
+        _ => None,
+    }
+}
+
+/// Every scene that a recipe or the readme runs, calibrates or varies is a good one with the keys it sets.
 #[test]
 fn recipes_are_good_scenes() {
-    let text = include_str!("../RECIPES.md").replace("\\\n", " ");
+    let readme = include_str!("../../README.md").replace("cargo run --release --", "colluvium");
+    let text = readme + &include_str!("../RECIPES.md").replace("\\\n", " ");
     let folder = tempfile::tempdir().unwrap();
     let mut checked = 0;
     for line in text.lines() {
@@ -39,8 +49,9 @@ fn recipes_are_good_scenes() {
             continue;
         }
         let mut arguments = vec!["check", scene.as_str()];
-        for pair in options.windows(2).filter(|pair| pair[0] == "--set") {
-            arguments.extend(pair.iter().map(String::as_str));
+        let sets: Vec<String> = options.windows(2).filter_map(key_and_value).collect();
+        for set in &sets {
+            arguments.extend(["--set", set]);
         }
         succeed(folder.path(), &arguments);
         checked += 1;

@@ -231,7 +231,10 @@ impl<const D: usize> Ground<D> {
         let pieces = terrain.shape.bends(&lines);
         let by_cell = pieces.chunk_by(|a, b| a.cell == b.cell);
         ground.bends = by_cell
-            .filter(|pieces| ground.planes[pieces[0].cell].is_some())
+            .filter(|pieces| {
+                let cell = pieces[0].cell;
+                ground.free[cell] > 0.0 && ground.solid[cell] > 0.0
+            })
             .map(|pieces| (pieces[0].cell, Bend::of(pieces)))
             .collect();
         Ok(ground)

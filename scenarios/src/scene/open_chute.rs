@@ -62,7 +62,7 @@ pub struct OpenChuteGrid {
     /// Length of the chute over the depth.
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 1000.0))]
     pub length_scaled: f64,
-    /// Height of the grid over the depth.
+    /// Height of the grid over the depth; the whole grid has at most ten times as many cells as may hold material.
     #[schemars(extend("exclusiveMinimum" = 1.0, "maximum" = 100.0))]
     pub room_scaled: f64,
 }
@@ -170,7 +170,8 @@ impl OpenChuteScene {
                 "grid.room_scaled",
                 self.grid.room_scaled.to_string(),
                 format!(
-                    "at most {} cells in the grid, here {all:.0}",
+                    "at most {:.3} here: {} cells in the grid",
+                    LARGEST_ROOM * most / filled,
                     LARGEST_ROOM * most
                 ),
             ));

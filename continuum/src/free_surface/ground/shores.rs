@@ -60,7 +60,7 @@ pub(crate) struct Shores {
 pub(crate) struct Motion<'a, const D: usize> {
     /// Velocities on faces.
     pub velocity: &'a [Vec<f64>; D],
-    /// −g h along each axis: the squares of the speeds of a fall through a cell, upwards.
+    /// −g h along each axis: in cells' coordinates the way up, as long as the square of the speed of a fall through a cell.
     pub falls: [f64; D],
 }
 

@@ -102,8 +102,31 @@ impl Polygon {
 /// Ground in a cell within which its surface bends: what lies under each of its pieces, with a sign.
 #[derive(Debug, Clone, PartialEq, Default)]
 pub(super) struct Bend {
-    polygons: Vec<(Polygon, f64)>,
+    slices: Vec<Slice>,
     prisms: Vec<Prism>,
+}
+
+/// What lies between a line and the floor of its cell.
+#[derive(Debug, Clone, Copy, PartialEq)]
+struct Slice {
+    polygon: Polygon,
+    /// With its sign.
+    area: f64,
+}
+
+impl Slice {
+    /// The area under a plane, with its sign.
+    fn under(&self, plane: &Plane) -> f64 {
+        let corners = &self.polygon.corners[..self.polygon.count];
+        let depths = || corners.iter().map(|&[x, y]| plane.depth([x, y, 0.0]));
+        if depths().all(|depth| depth >= 0.0) {
+            self.area
+        } else if depths().all(|depth| depth <= 0.0) {
+            0.0
+        } else {
+            self.polygon.under(plane).area().copysign(self.area)
+        }
+    }
 }
 
 impl Bend {
@@ -120,7 +143,8 @@ impl Bend {
                     };
                     let polygon = Polygon::between([from[0], to[0]]).under(&line);
                     if polygon.count > 0 {
-                        bend.polygons.push((polygon, piece.sign));
+                        let area = piece.sign * polygon.area();
+                        bend.slices.push(Slice { polygon, area });
                     }
                 }
                 Shape::Triangle(top) => bend.prisms.push(Prism::under_triangle(top, piece.sign)),
@@ -131,10 +155,7 @@ impl Bend {
 
     /// Volume of it under a plane.
     pub(super) fn under(&self, plane: &Plane) -> f64 {
-        let polygons = self.polygons.iter();
-        let areas: f64 = polygons
-            .map(|(polygon, sign)| sign * polygon.under(plane).area())
-            .sum();
+        let areas: f64 = self.slices.iter().map(|slice| slice.under(plane)).sum();
         let volumes: f64 = self.prisms.iter().map(|prism| prism.under(plane)).sum();
         areas + volumes
     }
@@ -337,9 +358,45 @@ mod tests {
             cells: [1; 3],
         };
         let bend = Bend::of(&ground.bends(&lines));
+        assert!(ground.bends(&lines).iter().all(|piece| piece.sign == 1.0));
         let level = |z| Plane::of_fraction([0.0, 0.0, 1.0], z);
         for (plane, exact) in [(level(1.0), 0.3), (level(0.3), 0.225), (level(0.6), 0.3)] {
             assert!((bend.under(&plane) - exact).abs() < 1e-15);
         }
+    }
+
+    /// In space the same of terrain with a fold that hangs over, in cells that are no cubes.
+    #[test]
+    fn pieces_of_ground_add_up_under_a_fold() {
+        // Along x down, back under itself and on.
+        let section = [[-1.0, 1.3], [2.1, 1.7], [1.3, 0.9], [1.2, 0.7], [5.0, 0.4]];
+        let at = |n: usize, y: f64| [section[n][0] + 0.1 * y, y, section[n][1] - 0.05 * y];
+        let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+        for n in 0..section.len() {
+            vertices.extend([at(n, -1.0), at(n, 5.0)]);
+        }
+        for n in (0..2 * section.len() - 2).step_by(2) {
+            triangles.extend([[n, n + 2, n + 3], [n, n + 3, n + 1]]);
+        }
+        let ground = Surface::new(vertices, triangles).unwrap();
+        let lines = GridLines {
+            origin: [0.0; 3],
+            spacing: [1.0, 0.5, 0.8],
+            cells: [3, 4, 3],
+        };
+        let cut = ground.cut(&lines, false).unwrap();
+        let pieces = ground.bends(&lines);
+        assert!(pieces.iter().any(|piece| piece.sign < 0.0));
+        let all = Plane::of_fraction([0.0, 0.0, 1.0], 1.0);
+        let mut bent = 0;
+        for pieces in pieces.chunk_by(|a, b| a.cell == b.cell) {
+            let cell = pieces[0].cell;
+            let index = [cell % 3, cell / 3 % 4, cell / 12];
+            let solid = 1.0 - cut.volume_fraction(index);
+            let found = Bend::of(pieces).under(&all);
+            assert!((found - solid).abs() < 1e-13, "{index:?} {found} {solid}");
+            bent += 1;
+        }
+        assert!(bent >= 8, "{bent}");
     }
 }
