@@ -51,7 +51,8 @@ pub(crate) const LOOSE: f64 = 1e-6;
 
 /// Factors of earlier coefficients are kept as long as a solution takes no more directions than this.
 const KEPT_UNTIL: usize = 30;
-/// Directions after which a solution with factors of earlier coefficients goes on with new ones.
+/// Directions after which a solution with factors of earlier coefficients goes on with new ones, or as soon as it can be
+/// foreseen that it will.
 const KEPT_DIRECTIONS: usize = 30;
 
 /// How systems are solved.
@@ -343,6 +344,7 @@ impl SparseSystem {
         if self.state == Factors::Symmetric && self.is_kept {
             let short = Goal {
                 directions: KEPT_DIRECTIONS,
+                foresees: true,
                 ..goal
             };
             if self.iterate(right_hand_side, solution, short) {

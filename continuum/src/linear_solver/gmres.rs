@@ -5,6 +5,8 @@
 const DIRECTIONS: usize = 40;
 /// Restarts before the iteration is given up.
 const CYCLES: usize = 3;
+/// Directions after which it is foreseen how many more a solution needs: by then the residual falls at its pace.
+const FORESEEN_AFTER: usize = 8;
 /// Weighted rows are asked for no smaller residual than this part of their right-hand side.
 const LEAST_REDUCTION: f64 = 1e-9;
 
@@ -19,6 +21,8 @@ pub(super) struct Goal {
     pub weighted_from: usize,
     /// count by so much in the residual.
     pub weight: f64,
+    /// Whether to give up as soon as so many directions will not be enough at the pace of the residual so far.
+    pub foresees: bool,
     /// Whether to start from the solution as it is given, not from zero.
     pub goes_on: bool,
 }
@@ -31,6 +35,7 @@ impl Goal {
             directions: DIRECTIONS * CYCLES,
             weighted_from: usize::MAX,
             weight: 1.0,
+            foresees: false,
             goes_on: false,
         }
     }
@@ -39,6 +44,14 @@ impl Goal {
     fn scale(&self, r: &mut [f64], factor: f64) {
         let rows = r.iter_mut().skip(self.weighted_from);
         rows.for_each(|r| *r *= factor);
+    }
+
+    /// Whether `left` directions are too few if the first `used` of them have brought the residual down to such a part of
+    /// what it was, and it has to fall to `aim` of it.
+    fn foresees_failure(&self, used: usize, left: usize, reduction: f64, aim: f64) -> bool {
+        self.foresees
+            && used >= FORESEEN_AFTER
+            && reduction.ln() * left as f64 > aim.ln() * used as f64
     }
 
     /// Size of the weighted residual at which the iteration ends: so much of the right-hand side without weights, but
@@ -141,16 +154,22 @@ impl Gmres {
             self.basis[0].iter_mut().for_each(|v| *v /= size);
             self.reduced.fill(0.0);
             self.reduced[0] = size;
-            let mut used = 0;
-            while used < left.min(DIRECTIONS) && self.reduced[used].abs() > 0.5 * target {
+            let aim = 0.5 * target;
+            let (mut used, mut is_given_up) = (0, false);
+            while used < left.min(DIRECTIONS) && self.reduced[used].abs() > aim && !is_given_up {
                 self.extend(used, &mut multiply, &mut precondition, goal);
                 used += 1;
+                let reduction = self.reduced[used].abs() / size;
+                is_given_up = goal.foresees_failure(used, left, reduction, aim / size);
             }
             if used == 0 {
                 return false;
             }
             self.iterations += used;
             self.add_combination(used, x);
+            if is_given_up {
+                return false;
+            }
             is_zero = false;
         }
     }
@@ -250,6 +269,49 @@ mod tests {
         for (x, expected) in x.iter().zip([1.0, 2.0, 3.0]) {
             assert!((x - expected).abs() < 1e-9);
         }
+    }
+
+    /// An iteration that foresees that it will not come to its end in time gives up early and keeps what it has; one that
+    /// does not foresee it goes on, and one that has enough directions gets there.
+    #[test]
+    fn failure_is_foreseen() {
+        // The residual of a shift falls slowly, and evenly.
+        let size = 60;
+        let multiply = |x: &[f64], y: &mut [f64]| {
+            for n in 0..size {
+                y[n] = x[n] + 0.8 * x[(n + 1) % size];
+            }
+        };
+        let mut b = vec![0.0; size];
+        b[0] = 1.0;
+        let solve = |goal: Goal| {
+            let mut x = vec![0.0; size];
+            let mut gmres = Gmres::new(size);
+            let solved = gmres.solve(multiply, |_| {}, &b, &mut x, goal);
+            let mut y = vec![0.0; size];
+            multiply(&x, &mut y);
+            let left: f64 = y.iter().zip(&b).map(|(y, b)| (y - b).powi(2)).sum();
+            (solved, gmres.iterations(), left.sqrt())
+        };
+        let short = Goal {
+            directions: 20,
+            foresees: true,
+            ..Goal::full(1e-3)
+        };
+        let (solved, directions, left) = solve(short);
+        assert!(!solved && directions == FORESEEN_AFTER, "{directions}");
+        assert!(left < 0.3, "{left}");
+        let (solved, directions, _) = solve(Goal {
+            foresees: false,
+            ..short
+        });
+        assert!(!solved && directions == 20, "{directions}");
+        let (solved, directions, left) = solve(Goal {
+            directions: 40,
+            ..short
+        });
+        assert!(solved && directions > 20, "{directions}");
+        assert!(left <= 1e-3, "{left}");
     }
 
     /// Weighted rows are met more closely than the others, at the same sum of both.

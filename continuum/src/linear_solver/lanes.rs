@@ -1,7 +1,7 @@
 //! Eight numbers that are computed with at once.
 //!
 //! Compilers rearrange plain loops over a few columns of eight rows into gathers and permutations that take longer than
-//! the arithmetic, so processors with AVX-512 are told what to do. Products are rounded before they are added: the bits
+//! the arithmetic, so processors with AVX2 or AVX-512 are told what to do. Products are rounded before they are added: the bits
 //! are the same on every processor.
 
 /// How many.
@@ -69,7 +69,79 @@ impl Lanes for Plain {
 }
 
 #[cfg(target_arch = "x86_64")]
+pub(super) use avx2::Halves;
+#[cfg(target_arch = "x86_64")]
 pub(super) use avx512::Wide;
+
+#[cfg(target_arch = "x86_64")]
+mod avx2 {
+    use std::arch::x86_64::{
+        __m256d, _mm_loadu_ps, _mm256_add_pd, _mm256_cvtps_pd, _mm256_loadu_pd, _mm256_mul_pd,
+        _mm256_set1_pd, _mm256_storeu_pd, _mm256_sub_pd,
+    };
+
+    use super::{LANES, Lanes};
+
+    /// Twice four, for processors with AVX2; only to be used in functions compiled for it, which are the only ones that call
+    /// generic code with this type.
+    #[derive(Debug, Clone, Copy)]
+    pub(in super::super) struct Halves(__m256d, __m256d);
+
+    impl Lanes for Halves {
+        #[inline(always)]
+        fn all(value: f64) -> Self {
+            // SAFETY: the processor has AVX.
+            let half = unsafe { _mm256_set1_pd(value) };
+            Self(half, half)
+        }
+
+        #[inline(always)]
+        fn load(values: &[f64; LANES]) -> Self {
+            let from = values.as_ptr();
+            // SAFETY: the processor has AVX, and eight numbers are there.
+            unsafe { Self(_mm256_loadu_pd(from), _mm256_loadu_pd(from.add(4))) }
+        }
+
+        #[inline(always)]
+        fn widen(values: &[f32; LANES]) -> Self {
+            let from = values.as_ptr();
+            // SAFETY: the processor has AVX, and eight numbers are there.
+            unsafe {
+                Self(
+                    _mm256_cvtps_pd(_mm_loadu_ps(from)),
+                    _mm256_cvtps_pd(_mm_loadu_ps(from.add(4))),
+                )
+            }
+        }
+
+        #[inline(always)]
+        fn store(self, values: &mut [f64; LANES]) {
+            let to = values.as_mut_ptr();
+            // SAFETY: the processor has AVX, and there is room for eight numbers.
+            unsafe {
+                _mm256_storeu_pd(to, self.0);
+                _mm256_storeu_pd(to.add(4), self.1);
+            }
+        }
+
+        #[inline(always)]
+        fn plus(self, a: Self, b: Self) -> Self {
+            // SAFETY: the processor has AVX.
+            unsafe {
+                Self(
+                    _mm256_add_pd(self.0, _mm256_mul_pd(a.0, b.0)),
+                    _mm256_add_pd(self.1, _mm256_mul_pd(a.1, b.1)),
+                )
+            }
+        }
+
+        #[inline(always)]
+        fn minus(self, a: Self) -> Self {
+            // SAFETY: the processor has AVX.
+            unsafe { Self(_mm256_sub_pd(self.0, a.0), _mm256_sub_pd(self.1, a.1)) }
+        }
+    }
+}
 
 #[cfg(target_arch = "x86_64")]
 mod avx512 {

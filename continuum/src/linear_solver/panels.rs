@@ -8,7 +8,7 @@
 use faer::sparse::linalg::cholesky::supernodal::SymbolicSupernodalCholesky;
 
 #[cfg(target_arch = "x86_64")]
-use super::lanes::Wide;
+use super::lanes::{Halves, Wide};
 use super::lanes::{LANES, Lanes, Plain};
 use super::subtrees::Subtree;
 use crate::threads;
@@ -281,7 +281,7 @@ impl Panels {
     #[cfg(target_arch = "x86_64")]
     #[target_feature(enable = "avx2")]
     unsafe fn substitute_avx2(&mut self, is_up: bool) {
-        self.substitute_by::<Plain>(is_up);
+        self.substitute_by::<Halves>(is_up);
     }
 
     /// The substitution compiled for AVX-512.
@@ -322,7 +322,10 @@ impl Panels {
             let height = columns + rows.len();
             let local = &mut self.local[..height + LANES];
             local[..columns].copy_from_slice(&x[first..first + columns]);
-            local[columns..].fill(0.0);
+            for (value, &row) in local[columns..].iter_mut().zip(rows) {
+                *value = x[row as usize];
+            }
+            local[height..].fill(0.0);
             for (from, width) in panels(columns) {
                 let below = height - from - width;
                 let panel = &self.values[place..place + size_of_panel(width, below)];
@@ -336,8 +339,8 @@ impl Panels {
                 }
             }
             x[first..first + columns].copy_from_slice(&local[..columns]);
-            for (&row, change) in rows.iter().zip(&local[columns..]) {
-                x[row as usize] += change;
+            for (&row, value) in rows.iter().zip(&local[columns..]) {
+                x[row as usize] = *value;
             }
         }
     }
