@@ -250,7 +250,11 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 }
             }
             point.weight *= (1.0 - 0.5 * beside) * share / slope.stretch().sqrt();
-            point.pressure_offset = total[j] / self.grid.face_area(axis) * slope.weight;
+            // What presses from outside acts on the layer's surface, which is as long as the ground below it.
+            let cells = self.topology.face_cells[component][face];
+            let outside = cells.map(|cell| 0.5 * self.pressure_beyond(cell, 0.0));
+            point.pressure_offset = total[j] / self.grid.face_area(axis) * slope.weight
+                + (outside[0] + outside[1]) * slope.stretch();
             point.law = match ground.contact {
                 Contact::Coulomb(friction) => PointLaw::OnWall(friction),
                 _ => PointLaw::Material,
