@@ -480,11 +480,13 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
     pub(super) fn pressures_at(&self, cell: usize, nearest: f64) -> [Option<Way>; MOST_WAYS] {
         let mut all = [None; MOST_WAYS];
         if D == 2 || self.faces.pressure[cell] != NONE {
-            all[0] = self.pressure_at(cell, nearest).map(|(pressure, factor)| Way {
-                pressure,
-                share: 1.0,
-                factor,
-            });
+            all[0] = self
+                .pressure_at(cell, nearest)
+                .map(|(pressure, factor)| Way {
+                    pressure,
+                    share: 1.0,
+                    factor,
+                });
             return all;
         }
         let most = self.ways_inside(cell).map(|way| way.0).fold(0.0, f64::max);

@@ -23,6 +23,11 @@ use crate::wall_friction::PointLaw;
 /// Cells with less material count as empty beside a thin layer.
 pub(super) const EMPTY: f64 = 1e-9;
 
+/// A layer reaches a face if what it fills there is this part of what it fills of its cell.
+const REACHES: f64 = 0.25;
+/// How near to a face that is, in cells.
+const BESIDE: f64 = 1e-3;
+
 /// How a thin layer lies on a slope, seen from the component of one of its unknowns.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Slope<const D: usize> {
@@ -133,19 +138,50 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         })
     }
 
-    /// Rise of the surface of a thin layer across a face, in cells along `axis`. Ground that stands out
-    /// beside it does not push it.
-    fn surface_rise(&self, ground: &Ground<D>, axis: usize, [low, high]: [usize; 2]) -> f64 {
+    /// Rise of the surface of a thin layer across a face between two cells along `along`, in cells along `axis`. Ground that
+    /// stands out beside it does not push it, nor down the slope does matter that ends before the face: nothing would
+    /// follow the velocity, which would grow for ever over matter at rest.
+    fn surface_rise(
+        &self,
+        ground: &Ground<D>,
+        axis: usize,
+        along: usize,
+        [low, high]: [usize; 2],
+    ) -> f64 {
         let [[low_filled, low_level], [high_filled, high_level]] = [low, high].map(|cell| {
             let [filled, level] = ground.thickness(self.topology, self.fractions, axis, cell);
             [filled, self.level_at_shore(ground, axis, cell, level)]
         });
         let rise = high_level - low_level;
+        let step = high_filled - low_filled;
+        let (thicker, side) = if step < 0.0 { (low, 1) } else { (high, 0) };
+        if (rise - step) * step.signum() > EMPTY {
+            let reach = self.reach(ground, thicker, along, side);
+            return rise - (1.0 - reach) * step;
+        }
         if (high_filled <= EMPTY && rise > 0.0) || (low_filled <= EMPTY && rise < 0.0) {
             0.0
         } else {
             rise
         }
+    }
+
+    /// How far the matter of a cell reaches its face on one side of an axis, from 0 to 1. Were it all or nothing, matter would
+    /// stop where it just touches the face, and creep on with what little is there.
+    fn reach(&self, ground: &Ground<D>, cell: usize, axis: usize, side: usize) -> f64 {
+        let filled = self.fractions[cell];
+        if filled <= EMPTY {
+            return 0.0;
+        }
+        let (mut low, mut high) = ([0.0; 3], [1.0; 3]);
+        if side == 1 {
+            low[axis] = 1.0 - BESIDE;
+        } else {
+            high[axis] = BESIDE;
+        }
+        let share = ground.matter(cell, filled, self.planes[cell].as_ref(), low, high);
+        let aperture = ground.aperture[axis][self.topology.cell_faces[cell][axis][side]];
+        (aperture * share / (REACHES * filled)).min(1.0)
     }
 
     /// Height of the surface in the middle of a column of three cells with one in the middle, from its foot: that of matter
@@ -180,7 +216,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
     ) -> [f64; D] {
         let spacing = |axis: usize| self.grid.axes()[axis].spacing();
         let rise = |low: usize, high: usize, along: usize| {
-            self.surface_rise(ground, slope.axis, [low, high]) * spacing(slope.axis)
+            self.surface_rise(ground, slope.axis, along, [low, high]) * spacing(slope.axis)
                 / spacing(along)
         };
         let [low, high] = self.topology.face_cells[component][face];
@@ -250,11 +286,16 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 }
             }
             point.weight *= (1.0 - 0.5 * beside) * share / slope.stretch().sqrt();
-            // What presses from outside acts on the layer's surface, which is as long as the ground below it.
-            let cells = self.topology.face_cells[component][face];
-            let outside = cells.map(|cell| 0.5 * self.pressure_beyond(cell, 0.0));
-            point.pressure_offset = total[j] / self.grid.face_area(axis) * slope.weight
-                + (outside[0] + outside[1]) * slope.stretch();
+            // What presses from outside acts on a surface as long as the ground below, of which each row bears the
+            // share of what lies in it.
+            let [mut thickness, mut outside] = [0.0; 2];
+            for &cell in &self.topology.face_cells[component][face] {
+                thickness += ground.thickness(self.topology, self.fractions, axis, cell)[0];
+                outside += self.pressure_beyond(cell, 0.0);
+            }
+            let outside =
+                outside * slope.stretch() / (thickness * self.grid.axes()[axis].spacing());
+            point.pressure_offset = total[j] / self.grid.face_area(axis) * (slope.weight + outside);
             point.law = match ground.contact {
                 Contact::Coulomb(friction) => PointLaw::OnWall(friction),
                 _ => PointLaw::Material,

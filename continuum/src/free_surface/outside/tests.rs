@@ -35,11 +35,7 @@ fn level_ground(grid: &Grid<3>, topology: &Topology<3>) -> Ground<3> {
     let ends = [-1.0, CELLS as f64 + 1.0];
     let corners = ends.map(|x| ends.map(|y| [x, y, 1.0 / 3.0]));
     let terrain = Terrain {
-        shape: Surface::new(
-            corners.as_flattened().to_vec(),
-            vec![[0, 2, 1], [1, 2, 3]],
-        )
-        .unwrap(),
+        shape: Surface::new(corners.as_flattened().to_vec(), vec![[0, 2, 1], [1, 2, 3]]).unwrap(),
         origin: [0.0; 3],
         contact: Contact::FreeSlip,
         rise: [0; 3],
@@ -114,7 +110,11 @@ fn borne(over_ground: bool) -> ([f64; 2], f64, usize) {
     }
     // And it has no force on any velocity.
     let mut force = vec![0.0; discretisation.velocities()];
-    for (&(_, j, _), push) in discretisation.divergence().iter().zip(discretisation.gradient()) {
+    for (&(_, j, _), push) in discretisation
+        .divergence()
+        .iter()
+        .zip(discretisation.gradient())
+    {
         force[j] += push * PRESSURE;
     }
     for (force, load) in force.iter().zip(discretisation.load(none)) {
@@ -128,7 +128,10 @@ fn ways_that_are_alike_share_the_pressure_from_outside() {
     for over_ground in [false, true] {
         let ([least, most], wrong, ways) = borne(over_ground);
         println!("ground {over_ground}: {least} to {most}, {ways} ways: {wrong} if each counted");
-        assert!((least - 1.0).abs() < 1e-13 && (most - 1.0).abs() < 1e-13, "{least} {most}");
+        assert!(
+            (least - 1.0).abs() < 1e-13 && (most - 1.0).abs() < 1e-13,
+            "{least} {most}"
+        );
         assert!(ways > 1 && (wrong - ways as f64).abs() < 1e-13);
     }
 }
