@@ -48,7 +48,7 @@ fn rest(mut collapse: Collapse, until: f64) -> Option<f64> {
 const GRAINS: [f64; 2] = [0.32, 0.60];
 /// Specks that are left behind by the heap rest a little later than it does.
 const UNTIL: f64 = 9.0;
-const LATEST: f64 = 12.0;
+const LATEST: f64 = 24.0;
 /// Where slopes begin, which shifts them by parts of a cell.
 const EDGES: [f64; 4] = [1.2, 1.213, 1.23, 1.247];
 

@@ -25,7 +25,9 @@ pub(super) const EMPTY: f64 = 1e-9;
 
 /// A layer reaches a face if what it fills there is this part of what it fills of its cell.
 const REACHES: f64 = 0.25;
-/// How near to a face that is, in cells.
+/// A slope goes on if it changes by less than this part of itself from cell to cell.
+const EVEN: f64 = 0.1;
+/// How near to a face a layer has to be filled, in cells.
 const BESIDE: f64 = 1e-3;
 
 /// How a thin layer lies on a slope, seen from the component of one of its unknowns.
@@ -140,7 +142,8 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
 
     /// Rise of the surface of a thin layer across a face between two cells along `along`, in cells along `axis`. Ground that
     /// stands out beside it does not push it, nor down the slope does matter that ends before the face: nothing would
-    /// follow the velocity, which would grow for ever over matter at rest.
+    /// follow the velocity, which would grow for ever over matter at rest. (In a plane; in space what little reaches a face
+    /// is a matter of round-off.)
     fn surface_rise(
         &self,
         ground: &Ground<D>,
@@ -155,7 +158,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         let rise = high_level - low_level;
         let step = high_filled - low_filled;
         let (thicker, side) = if step < 0.0 { (low, 1) } else { (high, 0) };
-        if (rise - step) * step.signum() > EMPTY {
+        if D == 2 && self.goes_on_down(ground, [axis, along], thicker, rise - step, step) {
             let reach = self.reach(ground, thicker, along, side);
             return rise - (1.0 - reach) * step;
         }
@@ -164,6 +167,22 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         } else {
             rise
         }
+    }
+
+    /// Whether ground that rises by so many cells to the next column does so as in a cell itself, and falls the way the
+    /// thickness does by a step. Over an edge matter falls, whatever the planes beside it.
+    fn goes_on_down(
+        &self,
+        ground: &Ground<D>,
+        [axis, along]: [usize; 2],
+        cell: usize,
+        rise: f64,
+        step: f64,
+    ) -> bool {
+        let spacing = |axis: usize| self.grid.axes()[axis].spacing();
+        let wall = ground.wall[cell];
+        let here = -wall[along] * spacing(along) / (wall[axis] * spacing(axis));
+        rise * step.signum() > EMPTY && (here - rise).abs() <= EVEN * rise.abs()
     }
 
     /// How far the matter of a cell reaches its face on one side of an axis, from 0 to 1. Were it all or nothing, matter would
