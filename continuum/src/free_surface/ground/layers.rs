@@ -151,14 +151,19 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         along: usize,
         [low, high]: [usize; 2],
     ) -> f64 {
-        let [[low_filled, low_level], [high_filled, high_level]] = [low, high].map(|cell| {
+        let [
+            [low_filled, low_ground, low_level],
+            [high_filled, high_ground, high_level],
+        ] = [low, high].map(|cell| {
             let [filled, level] = ground.thickness(self.topology, self.fractions, axis, cell);
-            [filled, self.level_at_shore(ground, axis, cell, level)]
+            let at_shore = self.level_at_shore(ground, axis, cell, level);
+            [filled, level - filled, at_shore]
         });
         let rise = high_level - low_level;
         let step = high_filled - low_filled;
         let (thicker, side) = if step < 0.0 { (low, 1) } else { (high, 0) };
-        if D == 2 && self.goes_on_down(ground, [axis, along], thicker, rise - step, step) {
+        let of_ground = high_ground - low_ground;
+        if D == 2 && self.goes_on_down(ground, [axis, along], thicker, of_ground, step) {
             let reach = self.reach(ground, thicker, along, side);
             return rise - (1.0 - reach) * step;
         }
