@@ -20,6 +20,7 @@ mod outside;
 mod sheared_layers;
 mod shores;
 mod space;
+mod specks;
 mod steep_ground;
 mod terrain;
 mod time_order;

@@ -2,10 +2,13 @@
 
 use colluvium_continuum::Error;
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase, CollapseGround, Matter};
-use colluvium_continuum::free_surface::{Contact, Outside, SpaceFlow, SurfaceOptions};
+use colluvium_continuum::free_surface::{
+    Contact, Outside, SpaceFlow, SurfaceFlow, SurfaceOptions, Terrain,
+};
 use colluvium_continuum::grid::{Axis, Boundary, Grid};
 use colluvium_continuum::rheology::MuI;
 use colluvium_continuum::terrain::Profile;
+use colluvium_continuum::wall_friction::WallFriction;
 
 /// Cells over the height, which is the width; in natural units the column is 1 high.
 const ROWS: usize = 16;
@@ -292,4 +295,88 @@ fn forces_in_space_are_taken_whole() {
     assert_eq!(flow.take_untaken(), [0.0; 3]);
     outside.force[cell][1] = f64::INFINITY;
     assert!(flow.set_outside(outside).is_err());
+}
+
+/// A layer a twentieth of a cell thick on a slope of 1/4 that closes on itself, under a pressure p̂ from outside:
+/// acceleration of its faces over that of a block, cos θ (g sin θ − μ (g cos θ + p̂/t)), t its thickness; speeds over
+/// time where it is held.
+fn layer_under(pressure: f64, cover: f64) -> Vec<f64> {
+    let [columns, rows, up] = [16, 9, 4];
+    let (foot, thick) = (1.0, 0.05);
+    let at = |foot: f64| Profile::new(vec![[-1.0, foot - 0.25], [20.0, foot + 5.0]]).unwrap();
+    let (ground, surface) = (at(foot), at(foot + thick));
+    let fractions = (0..columns * rows).map(|cell| {
+        let low = [(cell % columns) as f64, (cell / columns) as f64];
+        let high = low.map(|x| x + 1.0);
+        surface.area_in(low, high) - ground.area_in(low, high)
+    });
+    let mut options = SurfaceOptions::default();
+    options.solver.strain_rate_floor = 1e-7;
+    options.solver.momentum_tolerance = 1e-9;
+    let mut flow: SurfaceFlow<MuI> = SurfaceFlow::over_ground(
+        Grid::with_moving_surface([
+            Axis::Periodic {
+                length: columns as f64,
+                cells: columns,
+            },
+            Axis::Bounded {
+                length: rows as f64,
+                cells: rows,
+                low: Boundary::NoSlip { velocity: 0.0 },
+                high: Boundary::FreeSlip,
+            },
+        ])
+        .unwrap(),
+        &Terrain {
+            shape: ground.clone(),
+            origin: [0.0; 2],
+            contact: Contact::Coulomb(WallFriction {
+                friction: 0.1,
+                cohesion: 0.0,
+            }),
+            rise: [up, 0],
+        },
+        fractions.collect(),
+        MuI::new(0.5, 0.8, 0.4, 0.05, 1.0, 1.0),
+        [0.0, -1.0],
+        options,
+    )
+    .unwrap();
+    flow.set_outside(Outside {
+        pressure: vec![pressure; columns * rows],
+        cover: vec![cover; columns * rows],
+        ..Outside::nothing(columns * rows)
+    })
+    .unwrap();
+    let dt = 0.01;
+    flow.accelerate_in_place(dt).unwrap();
+    let cosine = 1.0 / 0.25_f64.hypot(1.0);
+    let press = 0.1 * (cosine + cover * pressure / (thick * cosine));
+    let exact = (0.25 * cosine - press).max(0.0) * cosine;
+    let exact = if exact == 0.0 { 1.0 } else { exact };
+    let mut shares = Vec::new();
+    for (face, u) in flow.state().velocity[0].iter().enumerate() {
+        let (i, k) = (face % columns, face / columns);
+        let middle = foot + 0.25 * i as f64 + 0.5 * thick;
+        if i > 0 && (k as f64..k as f64 + 1.0).contains(&middle) {
+            shares.push(-u / (dt * exact));
+        }
+    }
+    shares.sort_by(f64::total_cmp);
+    shares
+}
+
+/// What presses from outside on a thin layer holds it by friction as its weight does.
+#[test]
+fn pressure_from_outside_holds_thin_layers() {
+    for (pressure, cover) in [(0.0, 0.0), (0.03, 1.0), (0.06, 0.5), (0.1, 0.0)] {
+        let shares = layer_under(pressure, cover);
+        println!("p {pressure}, cover {cover}: {shares:.4?}");
+        for share in shares {
+            assert!((share - 1.0).abs() < 1e-3, "{pressure} {cover} {share}");
+        }
+    }
+    let held = layer_under(0.1, 1.0);
+    println!("held: {held:?}");
+    assert!(held[held.len() - 1] < 1e-4, "{held:?}");
 }

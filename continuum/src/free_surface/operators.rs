@@ -39,6 +39,17 @@ pub(crate) const fn points_of(axes: usize) -> usize {
     1 << axes
 }
 
+/// One of the ways along which a pressure is extrapolated through the surface.
+#[derive(Debug, Clone, Copy)]
+pub(super) struct Way {
+    /// The unknown pressure of the active cell.
+    pub pressure: usize,
+    /// Weight of this way: those of all of them sum to one.
+    pub share: f64,
+    /// What comes of the unknown pressure along it.
+    pub factor: f64,
+}
+
 /// Material on a grid: what the operators are made from.
 pub(crate) struct Material<'a, const D: usize = DIMENSIONS, const C: usize = COMPONENTS> {
     pub grid: &'a Grid<D>,
@@ -466,14 +477,16 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
 
     /// The same pressure where several ways may be alike, as on the diagonal of what mirrors itself there: the
     /// mean of all.
-    pub(super) fn pressures_at(
-        &self,
-        cell: usize,
-        nearest: f64,
-    ) -> [Option<(usize, f64)>; MOST_WAYS] {
+    pub(super) fn pressures_at(&self, cell: usize, nearest: f64) -> [Option<Way>; MOST_WAYS] {
         let mut all = [None; MOST_WAYS];
         if D == 2 || self.faces.pressure[cell] != NONE {
-            all[0] = self.pressure_at(cell, nearest);
+            all[0] = self
+                .pressure_at(cell, nearest)
+                .map(|(pressure, factor)| Way {
+                    pressure,
+                    share: 1.0,
+                    factor,
+                });
             return all;
         }
         let most = self.ways_inside(cell).map(|way| way.0).fold(0.0, f64::max);
@@ -483,8 +496,12 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         };
         let share = 1.0 / alike().count() as f64;
         for (slot, way) in all.iter_mut().zip(alike()) {
-            let (p, factor) = self.extrapolated(cell, way, nearest);
-            *slot = Some((p, share * factor));
+            let (pressure, factor) = self.extrapolated(cell, way, nearest);
+            *slot = Some(Way {
+                pressure,
+                share,
+                factor,
+            });
         }
         all
     }
@@ -495,6 +512,20 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         self.outside.map_or(0.0, |outside| {
             (1.0 - factor) * outside.on_surface(cell, cell, 0.0)
         })
+    }
+
+    /// The same for all ways to a cell; where none leads to it the pressure there is that on the surface.
+    pub(super) fn pressure_from_outside(
+        &self,
+        cell: usize,
+        ways: &[Option<Way>; MOST_WAYS],
+    ) -> f64 {
+        if ways[0].is_none() {
+            return self.pressure_beyond(cell, 0.0);
+        }
+        let ways = ways.iter().flatten();
+        ways.map(|way| way.share * self.pressure_beyond(cell, way.factor))
+            .sum()
     }
 
     /// Adds the linear interpolation of pressure to a corner. On a wall it is extrapolated from the
@@ -518,14 +549,11 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         for cell in self.cells_at_corner(corner) {
             let share = 1.0 / count;
             let Some(axis) = wall else {
-                for (p, factor) in self
-                    .pressures_at(cell, NEAREST_EXTRAPOLATION)
-                    .into_iter()
-                    .flatten()
-                {
-                    point.add_pressure(p, share * factor);
-                    point.pressure_offset += share * self.pressure_beyond(cell, factor);
+                let ways = self.pressures_at(cell, NEAREST_EXTRAPOLATION);
+                for way in ways.iter().flatten() {
+                    point.add_pressure(way.pressure, share * way.share * way.factor);
                 }
+                point.pressure_offset += share * self.pressure_from_outside(cell, &ways);
                 continue;
             };
             let side = usize::from(corner[axis] > 0);

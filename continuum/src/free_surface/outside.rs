@@ -144,3 +144,6 @@ fn movers<const D: usize>(
         face => faces.role[axis][face].unknown(),
     })
 }
+
+#[cfg(test)]
+mod tests;

@@ -72,10 +72,10 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 found.known = self.layer_weight(ground, cell);
             } else {
                 let ways = self.pressures_at(cell, NEAREST_EXTRAPOLATION);
-                for (p, factor) in ways.into_iter().flatten() {
-                    found.add(p, factor);
-                    found.known += self.pressure_beyond(cell, factor);
+                for way in ways.iter().flatten() {
+                    found.add(way.pressure, way.share * way.factor);
                 }
+                found.known += self.pressure_from_outside(cell, &ways);
             }
             return found;
         }

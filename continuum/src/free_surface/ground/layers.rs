@@ -23,6 +23,13 @@ use crate::wall_friction::PointLaw;
 /// Cells with less material count as empty beside a thin layer.
 pub(super) const EMPTY: f64 = 1e-9;
 
+/// A layer reaches a face if what it fills there is this part of what it fills of its cell.
+const REACHES: f64 = 0.25;
+/// A slope goes on if it changes by less than this part of itself from cell to cell.
+const EVEN: f64 = 0.1;
+/// How near to a face a layer has to be filled, in cells.
+const BESIDE: f64 = 1e-3;
+
 /// How a thin layer lies on a slope, seen from the component of one of its unknowns.
 #[derive(Debug, Clone, Copy, PartialEq)]
 pub(crate) struct Slope<const D: usize> {
@@ -133,19 +140,72 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         })
     }
 
-    /// Rise of the surface of a thin layer across a face, in cells along `axis`. Ground that stands out
-    /// beside it does not push it.
-    fn surface_rise(&self, ground: &Ground<D>, axis: usize, [low, high]: [usize; 2]) -> f64 {
-        let [[low_filled, low_level], [high_filled, high_level]] = [low, high].map(|cell| {
+    /// Rise of the surface of a thin layer across a face between two cells along `along`, in cells along `axis`. Ground that
+    /// stands out beside it does not push it, nor down the slope does matter that ends before the face: nothing would
+    /// follow the velocity, which would grow for ever over matter at rest. (In a plane; in space what little reaches a face
+    /// is a matter of round-off.)
+    fn surface_rise(
+        &self,
+        ground: &Ground<D>,
+        axis: usize,
+        along: usize,
+        [low, high]: [usize; 2],
+    ) -> f64 {
+        let [
+            [low_filled, low_ground, low_level],
+            [high_filled, high_ground, high_level],
+        ] = [low, high].map(|cell| {
             let [filled, level] = ground.thickness(self.topology, self.fractions, axis, cell);
-            [filled, self.level_at_shore(ground, axis, cell, level)]
+            let at_shore = self.level_at_shore(ground, axis, cell, level);
+            [filled, level - filled, at_shore]
         });
         let rise = high_level - low_level;
+        let step = high_filled - low_filled;
+        let (thicker, side) = if step < 0.0 { (low, 1) } else { (high, 0) };
+        let of_ground = high_ground - low_ground;
+        if D == 2 && self.goes_on_down(ground, [axis, along], thicker, of_ground, step) {
+            let reach = self.reach(ground, thicker, along, side);
+            return rise - (1.0 - reach) * step;
+        }
         if (high_filled <= EMPTY && rise > 0.0) || (low_filled <= EMPTY && rise < 0.0) {
             0.0
         } else {
             rise
         }
+    }
+
+    /// Whether ground that rises by so many cells to the next column does so as in a cell itself, and falls the way the
+    /// thickness does by a step. Over an edge matter falls, whatever the planes beside it.
+    fn goes_on_down(
+        &self,
+        ground: &Ground<D>,
+        [axis, along]: [usize; 2],
+        cell: usize,
+        rise: f64,
+        step: f64,
+    ) -> bool {
+        let spacing = |axis: usize| self.grid.axes()[axis].spacing();
+        let wall = ground.wall[cell];
+        let here = -wall[along] * spacing(along) / (wall[axis] * spacing(axis));
+        rise * step.signum() > EMPTY && (here - rise).abs() <= EVEN * rise.abs()
+    }
+
+    /// How far the matter of a cell reaches its face on one side of an axis, from 0 to 1. Were it all or nothing, matter would
+    /// stop where it just touches the face, and creep on with what little is there.
+    fn reach(&self, ground: &Ground<D>, cell: usize, axis: usize, side: usize) -> f64 {
+        let filled = self.fractions[cell];
+        if filled <= EMPTY {
+            return 0.0;
+        }
+        let (mut low, mut high) = ([0.0; 3], [1.0; 3]);
+        if side == 1 {
+            low[axis] = 1.0 - BESIDE;
+        } else {
+            high[axis] = BESIDE;
+        }
+        let share = ground.matter(cell, filled, self.planes[cell].as_ref(), low, high);
+        let aperture = ground.aperture[axis][self.topology.cell_faces[cell][axis][side]];
+        (aperture * share / (REACHES * filled)).min(1.0)
     }
 
     /// Height of the surface in the middle of a column of three cells with one in the middle, from its foot: that of matter
@@ -180,7 +240,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
     ) -> [f64; D] {
         let spacing = |axis: usize| self.grid.axes()[axis].spacing();
         let rise = |low: usize, high: usize, along: usize| {
-            self.surface_rise(ground, slope.axis, [low, high]) * spacing(slope.axis)
+            self.surface_rise(ground, slope.axis, along, [low, high]) * spacing(slope.axis)
                 / spacing(along)
         };
         let [low, high] = self.topology.face_cells[component][face];
@@ -250,7 +310,16 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 }
             }
             point.weight *= (1.0 - 0.5 * beside) * share / slope.stretch().sqrt();
-            point.pressure_offset = total[j] / self.grid.face_area(axis) * slope.weight;
+            // What presses from outside acts on a surface as long as the ground below, of which each row bears the
+            // share of what lies in it.
+            let [mut thickness, mut outside] = [0.0; 2];
+            for &cell in &self.topology.face_cells[component][face] {
+                thickness += ground.thickness(self.topology, self.fractions, axis, cell)[0];
+                outside += self.pressure_beyond(cell, 0.0);
+            }
+            let outside =
+                outside * slope.stretch() / (thickness * self.grid.axes()[axis].spacing());
+            point.pressure_offset = total[j] / self.grid.face_area(axis) * (slope.weight + outside);
             point.law = match ground.contact {
                 Contact::Coulomb(friction) => PointLaw::OnWall(friction),
                 _ => PointLaw::Material,
