@@ -165,7 +165,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         let of_ground = high_ground - low_ground;
         if D == 2 && self.goes_on_down(ground, [axis, along], thicker, of_ground, step) {
             let reach = self.reach(ground, thicker, along, side);
-            return rise - (1.0 - reach) * step;
+            return of_ground + reach * (rise - of_ground);
         }
         if (high_filled <= EMPTY && rise > 0.0) || (low_filled <= EMPTY && rise < 0.0) {
             0.0
@@ -286,10 +286,20 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             // Gravity is a load on the mass of every unknown.
             parts.boundary_load[j] =
                 total[j] * drive[component] - self.acceleration[component] * parts.mass[j];
-            if ground.contact == Contact::FreeSlip || slope.weight == 0.0 {
+            let axis = slope.axis;
+            // What presses from outside acts on a surface as long as the ground below, of which each row bears the
+            // share of what lies in it.
+            let [mut thickness, mut outside] = [0.0; 2];
+            for &cell in &self.topology.face_cells[component][face] {
+                thickness += ground.thickness(self.topology, self.fractions, axis, cell)[0];
+                outside += self.pressure_beyond(cell, 0.0);
+            }
+            let outside =
+                outside * slope.stretch() / (thickness * self.grid.axes()[axis].spacing());
+            let weight = slope.weight + outside;
+            if ground.contact == Contact::FreeSlip || weight == 0.0 {
                 continue;
             }
-            let axis = slope.axis;
             let rate = 2.0 / self.grid.axes()[axis].spacing();
             let row = |along: usize| shear_row::<D>(along.min(axis), along.max(axis));
             // Half a cell deep over a whole face: weight times rate is the area under the layer.
@@ -310,16 +320,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 }
             }
             point.weight *= (1.0 - 0.5 * beside) * share / slope.stretch().sqrt();
-            // What presses from outside acts on a surface as long as the ground below, of which each row bears the
-            // share of what lies in it.
-            let [mut thickness, mut outside] = [0.0; 2];
-            for &cell in &self.topology.face_cells[component][face] {
-                thickness += ground.thickness(self.topology, self.fractions, axis, cell)[0];
-                outside += self.pressure_beyond(cell, 0.0);
-            }
-            let outside =
-                outside * slope.stretch() / (thickness * self.grid.axes()[axis].spacing());
-            point.pressure_offset = total[j] / self.grid.face_area(axis) * (slope.weight + outside);
+            point.pressure_offset = total[j] / self.grid.face_area(axis) * weight;
             point.law = match ground.contact {
                 Contact::Coulomb(friction) => PointLaw::OnWall(friction),
                 _ => PointLaw::Material,

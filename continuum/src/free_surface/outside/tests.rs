@@ -103,8 +103,10 @@ fn borne(over_ground: bool) -> ([f64; 2], f64, usize) {
         let ways: Vec<_> = ways.into_iter().flatten().collect();
         if ways.len() > most {
             most = ways.len();
+            // What comes of p̂ where each way is given all of what it lacks.
             wrong = ways.iter().fold(0.0, |sum, way| {
-                sum + way.share * way.factor + 1.0 - way.share * way.factor
+                let factor = way.share * way.factor;
+                sum + factor + material.pressure_beyond(cell, factor) / PRESSURE
             });
         }
     }
