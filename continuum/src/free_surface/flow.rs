@@ -14,8 +14,8 @@ pub use history::History;
 pub use state::{SpaceFields, SpaceState, Spent, SurfaceOptions, SurfaceState, SurfaceStep};
 
 use super::faces::ACTIVE;
-use super::ground::Ground;
 use super::ground::shores::Shores;
+use super::ground::{DUST, Ground};
 use super::open_ends::OpenEnds;
 use super::operators::points_of;
 use super::outside::Outside;
@@ -182,12 +182,13 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         })
     }
 
-    /// Largest speed on any face with material.
+    /// Largest speed on any face with more material than dust, 10⁻⁹ of a cell: what a rigid heap creeps by lifts as much
+    /// into the cells above it, from where it falls back in each step.
     pub fn max_speed(&self) -> f64 {
         let mut most = 0.0_f64;
         for (c, u) in self.state.velocity.iter().enumerate() {
             for (face, u) in u.iter().enumerate() {
-                if self.topology.face_mean(c, face, &self.state.fractions) > MASSLESS {
+                if self.topology.face_mean(c, face, &self.state.fractions) > DUST {
                     most = most.max(u.abs());
                 }
             }
