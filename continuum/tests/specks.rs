@@ -72,8 +72,8 @@ fn specks_on_slopes_come_to_rest() {
     assert_eq!(slides, None);
 }
 
-/// Of 36 lines and grids at least 32 rest; 26 did before. On the others matter lies on cells that are not full: a lump or a speck
-/// on it slides on, or what is under it drains.
+/// Of 36 lines and grids 34 rest; 26 did while a step of thickness pushed at faces that matter does not reach. On the others lumps
+/// lie on cells that are not full.
 #[test]
 #[ignore = "a minute"]
 fn specks_on_many_slopes_come_to_rest() {
@@ -88,5 +88,5 @@ fn specks_on_many_slopes_come_to_rest() {
         }
     }
     println!("{resting} of 36 rest");
-    assert!(resting >= 32, "{resting}");
+    assert!(resting >= 34, "{resting}");
 }

@@ -206,7 +206,7 @@ fn a_joint_stays_on_level_ground() {
     let near = "terrain.profile=[[0,0],[2.8,0],[2.8,-0.5],[6,-0.5]]";
     for (zones, words) in [
         (
-            "zones.edge_scaled=1.75",
+            "zones.edge_scaled=1.777",
             ["begin farther back", "zones.edge_scaled"],
         ),
         ("zones.x=[[0, 2.4]]", ["end farther back", "zones.x"]),
