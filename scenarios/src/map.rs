@@ -190,30 +190,3 @@ fn table(cells: &[Cell]) -> Table {
         .with("valid_i_high", "1", column(&|c| c.cell.valid_i[1]))
         .with("grain_steps", "1", column(&|c| c.grain_steps))
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    fn request(scene: &str, betas: &[f64]) -> Request {
-        Request {
-            scene: Scene::load(scene, &[]).unwrap(),
-            betas: betas.to_vec(),
-            rolling: vec![0.5, 2.0],
-            beds: 1,
-            out: PathBuf::from("/nonexistent/never"),
-            threads: Some(1),
-        }
-    }
-
-    #[test]
-    fn bad_requests_are_refused_before_anything_is_written() {
-        let why = |r: &Request| measure(r).unwrap_err().to_string();
-        assert!(why(&request("incline-glass", &[0.1, 1.0])).contains("incline-moderate"));
-        assert!(why(&request("bagnold", &[0.1, 1.0])).contains("bagnold"));
-        assert!(why(&request("incline-moderate", &[0.1])).contains("--beta"));
-        assert!(why(&request("incline-moderate", &[0.1, -1.0])).contains("positive"));
-        let far = why(&request("incline-moderate", &[0.1, 1e9]));
-        assert!(far.contains("beta") && far.contains("allowed"), "{far}");
-    }
-}

@@ -220,16 +220,4 @@ mod tests {
         assert_eq!(check(1.3, None).agrees(), None);
         assert!((check(1.1, None).in_errors().unwrap() - 2.0).abs() < 1e-9);
     }
-
-    #[test]
-    fn an_unknown_suite_is_refused_before_anything_is_written() {
-        let folder = tempfile::tempdir().unwrap();
-        let options = Options {
-            out: folder.path().join("new"),
-            ..Options::default()
-        };
-        let why = validate(Some("inclin"), &options).unwrap_err().to_string();
-        assert!(why.contains("incline"), "{why}");
-        assert!(!options.out.exists());
-    }
 }

@@ -53,4 +53,28 @@ pub const CASES: &[Case] = &[
         &["run", "mine/scene.toml", "--out", "mine"],
         &["--out", "mine", "not empty"],
     ),
+    (
+        &["validate", "inclin", "--out", "new"],
+        &["inclin", "incline"],
+    ),
+    (
+        &["map", "incline-glass", "--out", "new"],
+        &["incline-glass", "incline-moderate"],
+    ),
+    (
+        &["map", "bagnold", "--out", "new"],
+        &["bagnold", "incline-moderate"],
+    ),
+    (
+        &["map", "incline-moderate", "--beta", "0.1", "--out", "new"],
+        &["--beta", "0.1"],
+    ),
+    (
+        &["map", "incline-moderate", "--beta=0.1,-1", "--out", "new"],
+        &["--beta", "-1", "positive"],
+    ),
+    (
+        &["map", "incline-moderate", "--beta=0.1,1e9", "--out", "new"],
+        &["beta", "1000000000", "allowed"],
+    ),
 ];
