@@ -2,7 +2,7 @@
 
 use super::collapse::{self, options_of};
 use super::collapse_ground::contact;
-use super::surface_fields::space_frame;
+use super::surface_fields::{self, space_frame};
 use super::surface_run::{self, Course, Deposit, Followed, yields};
 use super::{Findings, Under};
 use crate::failure::Failure;
@@ -12,7 +12,7 @@ use crate::table::Table;
 use crate::vtkhdf::Frame;
 use colluvium_continuum::Error;
 use colluvium_continuum::channel_collapse::{ChannelCase, ChannelCollapse};
-use colluvium_continuum::free_surface::{SpaceState, SurfaceOptions, SurfaceStep, flowing_shares};
+use colluvium_continuum::free_surface::{SpaceState, SurfaceOptions, SurfaceStep};
 use colluvium_continuum::strain::SPACE_COMPONENTS;
 use colluvium_continuum::units::Units;
 
@@ -85,8 +85,8 @@ impl Followed<3, SPACE_COMPONENTS> for Falling<'_> {
         vec![f.time, f.position, f.height, at_wall, inside]
     }
 
-    fn flowing_shares(&self) -> [f64; 2] {
-        flowing_shares(&self.collapse.flow().cell_fields())
+    fn shares(&self) -> [f64; 3] {
+        surface_fields::shares(&self.collapse.fields(), &self.scene.rheology)
     }
 
     fn frame(&self) -> Frame {
@@ -191,7 +191,7 @@ fn describe(summary: &mut Summary, falling: &Falling, course: &Course) {
     ] {
         summary.put(name, Quantity::new(value, unit).from(source));
     }
-    surface_run::describe_shares(summary, course);
+    surface_run::describe_shares(summary, course, &scene.rheology);
     let deposit = Deposit {
         height: 2,
         rest_speed: collapse.rest_speed(),

@@ -2,7 +2,7 @@
 
 mod beside_continuum;
 
-use super::surface_fields::{SurfaceFields, field};
+use super::surface_fields::{self, SurfaceFields, field};
 use super::surface_run::{self, Course, Deposit, Followed, yields};
 use super::{Findings, Under, channel, collapse_ground, joined_column, world};
 use crate::failure::Failure;
@@ -14,9 +14,7 @@ use crate::table::Table;
 use crate::vtkhdf::{Cells, Frame, Values};
 use colluvium_continuum::Error;
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
-use colluvium_continuum::free_surface::{
-    SurfaceOptions, SurfaceState, SurfaceStep, ThinLayer, flowing_shares,
-};
+use colluvium_continuum::free_surface::{SurfaceOptions, SurfaceState, SurfaceStep, ThinLayer};
 use colluvium_continuum::rheology::ShearLaw;
 use colluvium_continuum::units::Units;
 use colluvium_continuum::wall_friction::{SideWalls, WallFriction};
@@ -183,8 +181,8 @@ impl<L: ShearLaw + Clone> Followed<2, 2> for Falling<'_, L> {
         vec![f.time, f.position, f.height]
     }
 
-    fn flowing_shares(&self) -> [f64; 2] {
-        flowing_shares(&self.collapse.flow().cell_fields())
+    fn shares(&self) -> [f64; 3] {
+        surface_fields::shares(&self.collapse.fields(), &self.scene.rheology)
     }
 
     fn frame(&self) -> Frame {
@@ -322,7 +320,7 @@ fn describe<L: ShearLaw + Clone>(summary: &mut Summary, falling: &Falling<L>, co
         "(x_front − width)/width",
     );
     put("deposit_height", height, "m", "greatest height at the end");
-    surface_run::describe_shares(summary, course);
+    surface_run::describe_shares(summary, course, &scene.rheology);
     let deposit = Deposit {
         height: 2,
         rest_speed: collapse.rest_speed(),

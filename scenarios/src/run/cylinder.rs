@@ -2,7 +2,7 @@
 
 use super::collapse::options_of;
 use super::collapse_ground::contact;
-use super::surface_fields::space_frame;
+use super::surface_fields::{self, space_frame};
 use super::surface_run::{self, Course, Deposit, Followed, yields};
 use super::{Findings, Under, cylinder_ground};
 use crate::failure::Failure;
@@ -12,7 +12,7 @@ use crate::table::Table;
 use crate::vtkhdf::Frame;
 use colluvium_continuum::Error;
 use colluvium_continuum::cylinder_collapse::{CylinderCase, CylinderCollapse};
-use colluvium_continuum::free_surface::{SpaceState, SurfaceStep, flowing_shares};
+use colluvium_continuum::free_surface::{SpaceState, SurfaceStep};
 use colluvium_continuum::strain::SPACE_COMPONENTS;
 use colluvium_continuum::units::Units;
 
@@ -127,8 +127,8 @@ impl Followed<3, SPACE_COMPONENTS> for Falling<'_> {
         ]
     }
 
-    fn flowing_shares(&self) -> [f64; 2] {
-        flowing_shares(&self.collapse.flow().cell_fields())
+    fn shares(&self) -> [f64; 3] {
+        surface_fields::shares(&self.collapse.fields(), &self.scene.rheology)
     }
 
     fn frame(&self) -> Frame {
@@ -294,7 +294,7 @@ fn describe(summary: &mut Summary, falling: &Falling, course: &Course, wall_s: f
         "1",
         "bytes: peak memory of the process over cells with a pressure",
     );
-    surface_run::describe_shares(summary, course);
+    surface_run::describe_shares(summary, course, &scene.rheology);
     let deposit = Deposit {
         height: 4,
         rest_speed: collapse.rest_speed(),

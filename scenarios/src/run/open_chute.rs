@@ -3,7 +3,7 @@
 use super::channel;
 use super::collapse::options_of;
 use super::collapse_ground::contact;
-use super::surface_fields::SurfaceFields;
+use super::surface_fields::{self, SurfaceFields};
 use super::surface_run::{self, Course, Followed};
 use super::{Findings, Under};
 use crate::failure::Failure;
@@ -12,9 +12,7 @@ use crate::summary::{Quantity, Summary};
 use crate::table::Table;
 use crate::vtkhdf::{Cells, Frame};
 use colluvium_continuum::Error;
-use colluvium_continuum::free_surface::{
-    SurfaceOptions, SurfaceState, SurfaceStep, flowing_shares,
-};
+use colluvium_continuum::free_surface::{SurfaceOptions, SurfaceState, SurfaceStep};
 use colluvium_continuum::open_chute::{Across, Feed, OpenChute, OpenChuteCase, Sides, SpaceChute};
 use colluvium_continuum::rheology::ShearLaw;
 use colluvium_continuum::units::Units;
@@ -206,8 +204,8 @@ where
         vec![self.chute.time(), volume, entered, left]
     }
 
-    fn flowing_shares(&self) -> [f64; 2] {
-        flowing_shares(&self.chute.flow().cell_fields())
+    fn shares(&self) -> [f64; 3] {
+        surface_fields::shares(&self.chute.fields(), &self.scene.rheology)
     }
 
     fn frame(&self) -> Frame {
@@ -353,7 +351,7 @@ fn describe<L: ShearLaw + Clone, const D: usize, const C: usize, const V: usize>
             "largest difference of a cell's fraction from that of its mirror image across the chute",
         );
     }
-    surface_run::describe_shares(summary, course);
+    surface_run::describe_shares(summary, course, &scene.rheology);
     surface_run::describe_steps(summary, fed, course, scene.solver.strain_rate_floor);
     let room = scene.grid.room_scaled * scene.depth;
     let deepest = depths.iter().fold(0.0_f64, |most, h| most.max(*h));

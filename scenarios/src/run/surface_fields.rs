@@ -1,8 +1,9 @@
 //! Fields over the cells of a flow with a moving surface, for pictures.
 
+use crate::scene::RheologyKeys;
 use crate::vtkhdf::{Cells, Field, Frame, Values};
 use colluvium_continuum::discretisation::COMPONENTS;
-use colluvium_continuum::free_surface::{CellFields, SpaceFields};
+use colluvium_continuum::free_surface::{CellFields, SpaceFields, flowing_shares};
 use colluvium_continuum::rheology::{MuI, strain_rate_norm};
 use colluvium_continuum::strain::{SPACE_COMPONENTS, deviator};
 
@@ -13,6 +14,30 @@ pub(super) fn field(name: &str, unit: &str, values: Values) -> Field {
         unit: unit.into(),
         values,
     }
+}
+
+/// Shares of the volume of cells (SI units): that flows, that flows where the equations of motion are ill posed, and that
+/// flows with an inertial number I = γ̇ d √(ρ_s/p) above those at which the law was measured; this last is NaN where
+/// the law has no such window. Below the window every flow passes on its way to rest: that is not counted.
+pub(super) fn shares<const D: usize, const C: usize>(
+    cells: &[CellFields<D, C>],
+    law: &RheologyKeys,
+) -> [f64; 3] {
+    let [flows, ill_posed] = flowing_shares(cells);
+    let whole: f64 = cells.iter().map(|c| c.fraction).sum();
+    let Some([_, largest]) = law.valid_inertial_numbers() else {
+        return [flows, ill_posed, f64::NAN];
+    };
+    let inertia = law.diameter * law.grain_density.sqrt();
+    let beyond = |c: &&CellFields<D, C>| {
+        c.flows && c.pressure > 0.0 && c.strain_rate * inertia > largest * c.pressure.sqrt()
+    };
+    let beyond: f64 = cells.iter().filter(beyond).map(|c| c.fraction).sum();
+    [
+        flows,
+        ill_posed,
+        if whole > 0.0 { beyond / whole } else { 0.0 },
+    ]
 }
 
 /// Fields of cells with material, then as many zeros as there are other cells in the picture.

@@ -7,6 +7,7 @@ use crate::cost::Cost;
 use crate::failure::Failure;
 use crate::frames;
 use crate::progress::Bar;
+use crate::scene::RheologyKeys;
 use crate::state_hash;
 use crate::summary::{Model, Quantity, Summary};
 use crate::table::Table;
@@ -37,8 +38,8 @@ pub(super) trait Followed<const D: usize, const C: usize> {
     fn profile(&self) -> (Vec<f64>, Vec<f64>);
     /// What is noted at every instant, the time first.
     fn row(&self) -> Vec<f64>;
-    /// Shares of the material's volume: that flows, and that flows where the equations are ill posed.
-    fn flowing_shares(&self) -> [f64; 2];
+    /// Shares of the material's volume: see [`super::surface_fields::shares`].
+    fn shares(&self) -> [f64; 3];
     /// The fields of now.
     fn frame(&self) -> Frame;
     /// Heights of the ground, if there is any: a run goes on over the same only.
@@ -54,8 +55,8 @@ pub(super) struct Course {
     rows: Vec<f64>,
     /// Numbers of a row.
     width: usize,
-    /// Which share of the volume flows and flows where the equations are ill posed, at every instant of the rows.
-    shares: Vec<[f64; 2]>,
+    /// [`Followed::shares`] at every instant of the rows.
+    shares: Vec<[f64; 3]>,
     /// Time, place and height, row by row.
     profiles: [Vec<f64>; 3],
     /// Heights of the ground; none on a level floor.
@@ -79,7 +80,7 @@ impl Course {
         let row = flow.row();
         if self.last().is_none_or(|last| last[0] < row[0]) {
             self.rows.extend(row);
-            self.shares.push(flow.flowing_shares());
+            self.shares.push(flow.shares());
         }
     }
 
@@ -115,13 +116,19 @@ impl Course {
         self.column(number).into_iter().fold(0.0, f64::max)
     }
 
-    /// The table of shares that flow, and flow where the equations are ill posed.
+    /// The table of shares that flow, flow where the equations are ill posed, and flow faster than the law was measured
+    /// for if it says so.
     pub fn flowing(&self) -> Table {
-        let share = |number: usize| self.shares.iter().map(|s| s[number]).collect();
-        Table::new("flowing")
+        let share = |number: usize| -> Vec<f64> { self.shares.iter().map(|s| s[number]).collect() };
+        let beyond = share(2);
+        let table = Table::new("flowing")
             .with("t", "s", self.column(0))
             .with("flowing_share", "1", share(0))
-            .with("ill_posed_share", "1", share(1))
+            .with("ill_posed_share", "1", share(1));
+        match beyond.iter().all(|share| share.is_nan()) {
+            true => table,
+            false => table.with("beyond_calibration_share", "1", beyond),
+        }
     }
 
     /// The table of profiles over the places of this name.
@@ -290,8 +297,9 @@ pub(super) fn describe_steps<const D: usize, const C: usize>(
     );
 }
 
-/// Says which shares of the material flowed, and flowed where the equations are ill posed.
-pub(super) fn describe_shares(summary: &mut Summary, course: &Course) {
+/// Says which shares of the material flowed, flowed where the equations are ill posed, and flowed faster than the law was
+/// measured for.
+pub(super) fn describe_shares(summary: &mut Summary, course: &Course, law: &RheologyKeys) {
     let largest = |number: usize| {
         let all = course.shares.iter().map(|s| s[number]);
         Quantity::new(all.fold(0.0, f64::max), "1")
@@ -303,6 +311,22 @@ pub(super) fn describe_shares(summary: &mut Summary, course: &Course) {
     summary.put(
         "largest_ill_posed_share",
         largest(1).from("of the volume: flows where short waves grow without bound, C(I) > 0"),
+    );
+    let Some([_, fastest]) = law.valid_inertial_numbers() else {
+        return;
+    };
+    let beyond = largest(2);
+    let share = beyond.value.unwrap_or(0.0);
+    if share > 0.0 {
+        summary.remarks.push(format!(
+            "Outside the calibration: the rheology was measured for I up to {fastest:.4}; at the instant of flowing.csv where most \
+             of it does, {:.1} % of the material's volume flows faster.",
+            100.0 * share
+        ));
+    }
+    summary.put(
+        "largest_beyond_calibration_share",
+        beyond.from("of the volume: flows with I above rheology.valid_i"),
     );
 }
 
