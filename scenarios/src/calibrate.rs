@@ -154,7 +154,9 @@ fn more_beds(body: &InclineScene) -> Result<Option<Beds>, Failure> {
         })
         .collect();
     let of_flows = flows_of_depths(body);
-    let factors = keys.depths.iter().chain(of_flows.iter().map(|(f, _)| f));
+    // Of other depths the stop alone is sought.
+    let depths: &[f64] = if keys.search { &keys.depths } else { &[] };
+    let factors = depths.iter().chain(of_flows.iter().map(|(f, _)| f));
     scenes.extend(factors.map(|factor| {
         let mut shallow = body.clone();
         shallow.grains.count = (body.grains.count as f64 * factor).round().max(50.0) as u64;
@@ -171,7 +173,7 @@ fn more_beds(body: &InclineScene) -> Result<Option<Beds>, Failure> {
         beds.grain_steps += bed.report.grain_steps;
         let list = match k + 1 {
             n if n < keys.beds as usize => &mut beds.others,
-            n if n < keys.beds as usize + keys.depths.len() => &mut beds.depths,
+            n if n < keys.beds as usize + depths.len() => &mut beds.depths,
             _ => &mut beds.of_flows,
         };
         list.push(OtherBed {

@@ -119,7 +119,7 @@ enum Command {
     CoarseGrain(Box<CoarseGrainArguments>),
     /// Run the suites with references and write one report of how far off each figure is
     Validate {
-        /// Suite: incline, overlap [default: all]
+        /// Suite: incline, overlap, column [default: all]
         suite: Option<String>,
         /// Directory of the runs and the report; what is finished there is not run again
         #[arg(long, value_name = "DIR", default_value = "results/validate")]

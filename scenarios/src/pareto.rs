@@ -144,6 +144,13 @@ impl Comparison {
             self.keys.join(", "),
             self.compared_with()
         ));
+        for (n, key) in self.keys.iter().enumerate() {
+            if let Some(words) = numbers(n, &rows).1 {
+                summary
+                    .remarks
+                    .push(format!("{key} in pareto.csv: {words}."));
+            }
+        }
         for row in &rows {
             let at = label(&self.keys, &row.values);
             if !row.error.is_finite() {
@@ -309,10 +316,7 @@ impl Comparison {
     fn table(&self, rows: &[Row]) -> Table {
         let mut table = Table::new("pareto");
         for (n, key) in self.keys.iter().enumerate() {
-            let values = rows
-                .iter()
-                .map(|r| number(&r.values[n]).unwrap_or(f64::NAN));
-            table = table.with(key, "", values.collect());
+            table = table.with(key, "", numbers(n, rows).0);
         }
         table = table
             .with("error", "1", rows.iter().map(|r| r.error).collect())
@@ -327,7 +331,11 @@ impl Comparison {
                 "s",
                 rows.iter().map(|r| r.processor_s).collect(),
             )
-            .with("steps", "1", rows.iter().map(|r| r.steps as f64).collect())
+            .with(
+                "grain_and_cell_steps",
+                "1",
+                rows.iter().map(|r| r.steps as f64).collect(),
+            )
             .with("on_front", "1", front(rows));
         if rows.iter().any(|r| r.speed_up.is_some()) {
             let speed_up = rows.iter().map(|r| r.speed_up.unwrap_or(f64::NAN));
@@ -361,14 +369,14 @@ impl Comparison {
             .map(|(name, _)| name.as_str())
             .collect();
         let mut text = format!(
-            "{}  {:>12}  {:>8}  {:>10}  {:>13}  {:>8}  {:>14}",
+            "{}  {:>12}  {:>8}  {:>10}  {:>13}  {:>8}  {:>20}",
             aligned(&self.keys),
             "error",
             "order",
             "wall [s]",
             "processor [s]",
             "speed-up",
-            "steps"
+            "grain and cell steps"
         );
         for name in &names {
             text.push_str(&format!("  {name:>12}"));
@@ -384,7 +392,7 @@ impl Comparison {
                 }
             };
             text.push_str(&format!(
-                "\n{}  {:>12}  {:>8}  {:>10.4}  {:>13.2}  {:>8}  {:>14}",
+                "\n{}  {:>12}  {:>8}  {:>10.4}  {:>13.2}  {:>8}  {:>20}",
                 aligned(&row.values),
                 error(row.error),
                 some(row.order),
@@ -403,6 +411,30 @@ impl Comparison {
     }
 }
 
+/// The values of a key, run by run, as numbers: what is no number is counted, 1 for the first; the second tells which is which.
+fn numbers(key: usize, rows: &[Row]) -> (Vec<f64>, Option<String>) {
+    let values: Vec<&str> = rows.iter().map(|r| r.values[key].as_str()).collect();
+    if let Some(numbers) = values.iter().map(|v| number(v)).collect() {
+        return (numbers, None);
+    }
+    let mut words: Vec<&str> = Vec::new();
+    let mut places = Vec::new();
+    for value in values {
+        let known = words.iter().position(|word| *word == value);
+        let place = known.unwrap_or(words.len());
+        if known.is_none() {
+            words.push(value);
+        }
+        places.push((place + 1) as f64);
+    }
+    let told = words
+        .iter()
+        .zip(1..)
+        .map(|(word, n)| format!("{n} is {word}"));
+    let told: Vec<String> = told.collect();
+    (places, Some(told.join(", ")))
+}
+
 /// What stands at the ends of error against cost: the reference, whose error is 0, and a run beside, if there are any.
 fn ends(reference: Option<&(Cost, f64)>, beside: Option<&Row>) -> Option<Table> {
     let mut rows: Vec<[f64; 4]> = Vec::new();
@@ -417,7 +449,7 @@ fn ends(reference: Option<&(Cost, f64)>, beside: Option<&Row>) -> Option<Table> 
             .with("error", "1", column(0))
             .with("wall_s", "s", column(1))
             .with("processor_s", "s", column(2))
-            .with("steps", "1", column(3))
+            .with("grain_and_cell_steps", "1", column(3))
     })
 }
 
@@ -503,6 +535,17 @@ mod tests {
         assert_eq!(order_between(&coarse, &row(&["fine"], 1e-3, 1.0)), None);
         let two = row(&["32", "2"], 1e-3, 1.0);
         assert_eq!(order_between(&coarse, &two), None);
+    }
+
+    #[test]
+    fn words_are_counted_and_numbers_stand() {
+        let rows = [
+            row(&["8", "dem"], 0.1, 1.0),
+            row(&["16", "hybrid"], 0.1, 1.0),
+        ];
+        assert_eq!(numbers(0, &rows), (vec![8.0, 16.0], None));
+        let words = Some("1 is dem, 2 is hybrid".to_owned());
+        assert_eq!(numbers(1, &rows), (vec![1.0, 2.0], words));
     }
 
     #[test]

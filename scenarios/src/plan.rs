@@ -56,6 +56,14 @@ pub fn plan(scene: &Scene) -> Result<String, Failure> {
     }
 }
 
+/// Who needs more steps than a collapse on the level.
+fn whose_steps(terrain: bool) -> &'static str {
+    match terrain {
+        true => " (more where the ground falls away: what falls farther is faster)",
+        false => "",
+    }
+}
+
 /// Lines of a plan: a topic and what is said about it.
 #[derive(Default)]
 struct Lines(String);

@@ -41,7 +41,7 @@ pub mod step;
 mod step_table;
 mod surface_fields;
 mod surface_run;
-mod surface_steps;
+pub mod surface_steps;
 mod tensile;
 mod tumbling_box;
 pub mod world;

@@ -215,6 +215,10 @@ impl Scene {
                 friction_keys::check_read(&table, &written, origin)?;
             }
             friction_keys::check_read(&table, &set_by_hand, option)?;
+            if folder.is_some() {
+                friction_keys::check_calibrated(&table, &written, origin)?;
+            }
+            friction_keys::check_calibrated(&table, &set_by_hand, option)?;
             friction_keys::drop_unread(&mut table);
             friction_keys::check_complete(&table, origin)?;
         }

@@ -370,7 +370,7 @@ fn error_against_cost_of_a_bed_is_a_table() {
     let column = |name: &str| header.iter().position(|h| h == name).unwrap();
     assert_eq!(rows.len(), 2);
     // Half the steps each time: all runs last equally long.
-    let steps = column("steps");
+    let steps = column("grain_and_cell_steps");
     assert_eq!(rows[0][steps], 2.0 * rows[1][steps]);
     for row in &rows {
         assert!(row[column("error")] >= row[column("error_solid_fraction")]);

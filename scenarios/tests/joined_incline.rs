@@ -200,5 +200,5 @@ fn error_against_cost_ends_at_full_grains() {
         assert!(row[at("error")] > 0.0 && row[at("error")] < 1.0, "{row:?}");
     }
     // More grains, more steps.
-    assert!(rows[2][at("steps")] > rows[0][at("steps")]);
+    assert!(rows[2][at("grain_and_cell_steps")] > rows[0][at("grain_and_cell_steps")]);
 }

@@ -1,7 +1,7 @@
 //! The plan of a collapse.
 
-use super::Lines;
-use crate::run;
+use super::{Lines, whose_steps};
+use crate::run::{self, surface_steps::steps_of};
 use crate::scene::CollapseScene;
 use colluvium_continuum::column_collapse::CollapseGround;
 
@@ -90,11 +90,12 @@ pub(super) fn collapse(body: &CollapseScene, ground: Option<&CollapseGround>) ->
             units.velocity
         ),
     );
-    let steps = body.duration_scaled * units.time() / step;
+    let steps = steps_of(body.duration_scaled * units.time(), step);
     lines.say(
         "cost",
         &format!(
-            "at most {steps:.0} steps, {:.2e} cell-steps",
+            "at most {steps:.0} steps{}, {:.2e} cell-steps",
+            whose_steps(body.terrain.is_some()),
             steps * column
         ),
     );

@@ -1,7 +1,7 @@
 //! The plan of the collapse of a cylinder.
 
-use super::Lines;
-use crate::run;
+use super::{Lines, whose_steps};
+use crate::run::{self, surface_steps::steps_of};
 use crate::scene::CylinderScene;
 use colluvium_continuum::cylinder_collapse::CylinderGround;
 
@@ -64,11 +64,12 @@ pub(super) fn cylinder(body: &CylinderScene, ground: Option<&CylinderGround>) ->
             units.velocity, body.solver.courant
         ),
     );
-    let steps = body.duration_scaled * units.time() / step;
+    let steps = steps_of(body.duration_scaled * units.time(), step);
     lines.say(
         "cost",
         &format!(
-            "at most {steps:.0} steps, {:.2e} cell-steps, about {:.2} GB",
+            "at most {steps:.0} steps{}, {:.2e} cell-steps, about {:.2} GB",
+            whose_steps(body.terrain.is_some()),
             steps * filled,
             filled * MEMORY_PER_CELL / 1e9
         ),

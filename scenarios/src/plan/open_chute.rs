@@ -1,7 +1,7 @@
 //! The plan of a fed chute.
 
 use super::Lines;
-use crate::run::{self, collapse_ground::words_of};
+use crate::run::{self, collapse_ground::words_of, surface_steps::steps_of};
 use crate::scene::{OpenChuteScene, Scene};
 use colluvium_continuum::open_chute::Sides;
 
@@ -63,7 +63,7 @@ pub(super) fn open_chute(
         "time step",
         &format!("about {step:.4e} s (courant {courant}, at most {largest:.4e} s)"),
     );
-    let steps = body.duration_scaled * time / step;
+    let steps = steps_of(body.duration_scaled * time, step);
     lines.say(
         "cost",
         &format!(

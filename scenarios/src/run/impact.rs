@@ -471,7 +471,7 @@ fn describe(
     );
     summary.put(
         "energy_after",
-        Quantity::new(energy.kinetic(), "J").against(before, "kinetic energy at the start"),
+        Quantity::new(energy.kinetic(), "J").from("kinetic, at the end"),
     );
     summary.put(
         "largest_overlap",

@@ -11,6 +11,12 @@ use colluvium_dem::Record;
 
 /// Instants of the front over the duration.
 pub(super) const FRONTS: f64 = 240.0;
+
+/// How many steps of about this length a run of this duration takes (s): every instant of the front ends one.
+pub fn steps_of(duration: f64, step: f64) -> f64 {
+    FRONTS * (duration / FRONTS / step - 1e-9).ceil()
+}
+
 /// Instants of profile and fields over the duration.
 pub(super) const PROFILES: f64 = 24.0;
 /// Steps at rest after which a run ends.

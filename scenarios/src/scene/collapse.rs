@@ -185,7 +185,10 @@ impl CollapseScene {
         let refused =
             |key: &str, value: String, range: String| Err(out_of_range(origin, key, value, range));
         match self.model {
-            CollapseModel::Hybrid => return self.check_zones(origin),
+            CollapseModel::Hybrid => {
+                self.check_law_beside_grains(origin)?;
+                return self.check_zones(origin);
+            }
             CollapseModel::Dem => return self.check_grains(origin),
             CollapseModel::Continuum => {}
         }
@@ -235,7 +238,30 @@ impl CollapseScene {
                 );
             }
         }
+        check_size_of_grains(&self.rheology, self.height, origin)?;
         check_rheology(&self.rheology, origin)
+    }
+
+    /// The continuum beside grains that has the scene's own law knows dry μ(I) alone.
+    fn check_law_beside_grains(&self, origin: &str) -> Result<(), SceneError> {
+        let own = &self.rheology;
+        if self.grains.calibrated.word().is_some() {
+            return Ok(());
+        }
+        let (key, value, range) = if own.law != FrictionLaw::MuI {
+            ("law", own.law.word().to_owned(), "mu-i")
+        } else if own.cohesion != 0.0 {
+            ("cohesion", own.cohesion.to_string(), "0")
+        } else {
+            return check_rheology(own, origin);
+        };
+        let range = format!("{range} with model = \"hybrid\"");
+        Err(out_of_range(
+            origin,
+            &format!("rheology.{key}"),
+            value,
+            range,
+        ))
     }
 }
 
@@ -247,6 +273,24 @@ pub(super) fn out_of_range(origin: &str, key: &str, value: String, range: String
         value,
         range,
     }
+}
+
+/// Refuses grains that are larger than the column (m) whose material they are.
+pub(super) fn check_size_of_grains(
+    law: &RheologyKeys,
+    height: f64,
+    origin: &str,
+) -> Result<(), SceneError> {
+    if law.diameter <= height {
+        return Ok(());
+    }
+    let range = format!("at most the height of what is made of such grains, {height} m");
+    Err(out_of_range(
+        origin,
+        "rheology.diameter",
+        law.diameter.to_string(),
+        range,
+    ))
 }
 
 /// Refuses laws under which nothing can collapse.

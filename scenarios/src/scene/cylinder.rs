@@ -1,6 +1,6 @@
 //! Keys of the collapse of a cylinder.
 
-use super::collapse::{check_rheology, out_of_range};
+use super::collapse::{check_rheology, check_size_of_grains, out_of_range};
 use super::{CollapseSolver, FrictionLaw, ReliefKeys, RheologyKeys, SceneError, SurfaceKeys};
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -110,6 +110,7 @@ impl CylinderScene {
                 "mu-i: cylinders collapse under this law alone".into(),
             ));
         }
+        check_size_of_grains(&self.rheology, self.height, origin)?;
         check_rheology(&self.rheology, origin)
     }
 }

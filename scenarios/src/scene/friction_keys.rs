@@ -59,7 +59,7 @@ pub fn forget_defaults(written: &mut Table, defaults: &Table) {
         return;
     };
     rheology.retain(|key, value| {
-        !LAW_KEYS.contains(&key)
+        !(LAW_KEYS.contains(&key) || MATERIAL_KEYS.contains(&key))
             || layers::get(defaults, &format!("rheology.{key}")) != Some(&*value)
     });
 }
@@ -85,6 +85,34 @@ pub fn check_read(table: &Table, layer: &Table, file: &str) -> Result<(), SceneE
         }
     }
     Ok(())
+}
+
+/// Keys that say what the continuum's material does, beside the numbers of its law.
+const MATERIAL_KEYS: [&str; 4] = ["law", "cohesion", "file", "from"];
+
+/// Refuses what a layer says of the continuum beside grains where that takes the law calibrated for them.
+pub fn check_calibrated(table: &Table, layer: &Table, file: &str) -> Result<(), SceneError> {
+    let word = |key: &str| layers::get(table, key).and_then(Value::as_str);
+    if word("model") != Some("hybrid") {
+        return Ok(());
+    }
+    let (Some(calibrated), Some(Value::Table(rheology))) =
+        (word("grains.calibrated"), layer.get("rheology"))
+    else {
+        return Ok(());
+    };
+    let said =
+        |key: &&String| LAW_KEYS.contains(&key.as_str()) || MATERIAL_KEYS.contains(&key.as_str());
+    match rheology.keys().find(said) {
+        Some(key) if calibrated != "none" => Err(SceneError::Unneeded {
+            file: file.to_owned(),
+            key: format!("rheology.{key}"),
+            choice: format!(
+                "model = \"hybrid\" with grains.calibrated = \"{calibrated}\", whose law the continuum has (with \"none\" it is read)"
+            ),
+        }),
+        _ => Ok(()),
+    }
 }
 
 /// Drops numbers that the law of the merged table does not read.

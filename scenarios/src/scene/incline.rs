@@ -199,7 +199,8 @@ pub struct CalibrationKeys {
     #[serde(default = "one")]
     #[schemars(extend("minimum" = 1, "maximum" = 64))]
     pub flow_beds: u64,
-    /// Shallower (or deeper) beds, as factors of the depth, for which the stop is sought too: h_stop(θ).
+    /// Shallower (or deeper) beds, as factors of the depth, for which the stop is sought too: h_stop(θ). Not read with
+    /// `search` = false.
     #[serde(default)]
     #[schemars(extend("minItems" = 0, "maxItems" = 20, "items" = {"type": "number", "minimum": 0.05, "maximum": 4.0}))]
     pub depths: Vec<f64>,

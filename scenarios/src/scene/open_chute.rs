@@ -1,6 +1,6 @@
 //! Keys of a chute that is fed at its upper end and open at its lower one.
 
-use super::collapse::{check_rheology, out_of_range};
+use super::collapse::{check_rheology, check_size_of_grains, out_of_range};
 use super::contact::SurfaceKeys;
 use super::{CollapseSolver, RheologyKeys, SceneError};
 use schemars::JsonSchema;
@@ -142,6 +142,7 @@ impl OpenChuteScene {
         if let Some(across) = &self.in_space {
             across.check_together(origin)?;
         }
+        check_size_of_grains(&self.rheology, self.depth, origin)?;
         let filled = self.filled();
         let most = match self.in_space {
             Some(_) => LARGEST_IN_SPACE,

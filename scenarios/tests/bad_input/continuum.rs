@@ -89,4 +89,50 @@ pub const CASES: &[Case] = &[
         &["run", "bagnold", "--set", "rheology.file=steep.toml"],
         &["rheology.file", "steep.toml", "rheology.mu_s", "[0, 5]"],
     ),
+    (
+        &[
+            "run",
+            "column-collapse",
+            "--set",
+            "model=hybrid",
+            "--set",
+            "rheology.mu_s=0.5",
+        ],
+        &["rheology.mu_s", "grains.calibrated = \"moderate\""],
+    ),
+    (
+        &[
+            "run",
+            "column-collapse",
+            "--set",
+            "model=hybrid",
+            "--set",
+            "grains.calibrated=none",
+            "--set",
+            "rheology.cohesion=10",
+        ],
+        &["rheology.cohesion", "10", "0 with model"],
+    ),
+    (
+        &[
+            "run",
+            "column-collapse",
+            "--set",
+            "model=hybrid",
+            "--set",
+            "grains.calibrated=none",
+            "--set",
+            "rheology.law=barker-gray",
+        ],
+        &["rheology.law", "barker-gray", "mu-i with model"],
+    ),
+    (
+        &["run", "column-collapse", "--set", "height=1e-3"],
+        &[
+            "rheology.diameter",
+            "0.0333",
+            "at most the height",
+            "0.001 m",
+        ],
+    ),
 ];

@@ -92,8 +92,8 @@ impl<'a> JoinedBed<'a> {
         }
     }
 
-    /// The law of the continuum at a solid fraction.
-    /// And the inertial number up to which it was measured.
+    /// The law of the continuum at a solid fraction, and the inertial number up to which it was measured: none is known of
+    /// numbers that the scene gives itself.
     fn law(&self, solid_fraction: f64) -> Result<(MuI, f64), Failure> {
         let keys = &self.scene.continuum;
         let materials = self.scene.materials(&self.origin)?;
@@ -105,6 +105,7 @@ impl<'a> JoinedBed<'a> {
             }
             None => ([f64::NAN; 3], f64::INFINITY),
         };
+        let is_own = [keys.mu_s, keys.mu_2, keys.i_0].iter().any(Option::is_some);
         let law = MuI {
             mu_s: keys.mu_s.unwrap_or(calibrated[0]),
             mu_2: keys.mu_2.unwrap_or(calibrated[1]),
@@ -114,7 +115,7 @@ impl<'a> JoinedBed<'a> {
             grain_density: self.scene.grain_density(&materials),
             cohesion: 0.0,
         };
-        Ok((law, valid))
+        Ok((law, if is_own { f64::INFINITY } else { valid }))
     }
 
     /// What the bed is joined from, at a solid fraction and with its surface at a height (m).
