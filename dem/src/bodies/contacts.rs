@@ -469,6 +469,11 @@ impl Bodies {
         overlap / (radius + walls[b].rounding)
     }
 
+    /// Forces of the contacts of bodies with walls and with each other (N).
+    pub fn forces(&self) -> impl Iterator<Item = f64> {
+        self.contacts.iter().map(|contact| contact.force.norm())
+    }
+
     /// Takes up contacts of a checkpoint.
     pub fn take_up(&mut self, contacts: Vec<BodyContact>) {
         self.contacts = contacts;
