@@ -43,6 +43,7 @@ impl Simulation {
         grains: &[Grain],
         clumps: &[Clump],
     ) -> Result<Range<u32>, SetupError> {
+        let (deepest, account) = (self.deepest, self.account);
         let ids = self.enter(grains)?;
         let numbered = |clump: &Clump| Clump {
             // Beyond the last number there is no grain, which is refused.
@@ -51,9 +52,9 @@ impl Simulation {
         };
         let numbered: Vec<Clump> = clumps.iter().map(numbered).collect();
         if let Err(error) = self.clump(&numbered) {
-            let deepest = self.deepest;
             self.remove(|grain| ids.contains(&grain.id));
-            self.deepest = deepest;
+            // Nobody has booked them.
+            (self.deepest, self.account) = (deepest, account);
             return Err(error);
         }
         if self.steps_since_start > 0 {

@@ -2,10 +2,10 @@
 //!
 //! The box grows and shrinks about its centre, and shears along x. An image n boxes away along axis k
 //! moves against the grain itself by `n dL_k/dt`; sheared, one above along the axis g by `γ̇ L_g` along x
-//! (Lees & Edwards 1972); an offset that is left stretches with the edge along x. Newton's equations are those of the space outside: nothing but contacts across
-//! the boundary and grains that cross it brings the motion in. A grain that crosses changes its velocity
-//! by that of the image (Tatsuuma et al. 2019, Eq. 12–15), in the lists' own time: until they are built
-//! anew it is known by an image of its own.
+//! (Lees & Edwards 1972); an offset that is left stretches with the edge along x. Newton's equations are
+//! those of the space outside: nothing but contacts across the boundary and grains that cross it brings
+//! the motion in. A grain that crosses changes its velocity by that of the image (Tatsuuma et al. 2019,
+//! Eq. 12–15), in the lists' own time: until they are built anew it is known by an image of its own.
 //!
 //! Where the rate changes, grains may be *carried*: each is kicked by the change of the velocity that
 //! uniform deformation has at its place. All images then stay alike. Without that, grains are taken into

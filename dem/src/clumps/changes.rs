@@ -79,6 +79,9 @@ impl Simulation {
         let mut new: Vec<u32> = rows.iter().filter_map(|&i| self.clumps.of(i)).collect();
         new.sort_unstable();
         new.dedup();
+        if new.is_empty() {
+            return;
+        }
         for clump in new {
             let (state, members) = self.clumps.one(clump as usize);
             let back = self.clump_kicked(state, members, -half);
