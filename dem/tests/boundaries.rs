@@ -131,27 +131,25 @@ fn contacts_across_a_moving_boundary_are_those_inside_the_box() {
 /// All images of a sheared box that stretches are alike: the world does not know where the box begins.
 #[test]
 fn a_box_that_was_sheared_stretches_its_offset_too() {
-    for carry in [false, true] {
-        let run = |by: Vector3<f64>| {
-            let mut simulation = in_moved_world(&shear(2, 8.0, carry), by);
-            simulation.advance(400).unwrap();
-            simulation
-                .set_box_motion(stretch([-6.0, 0.0, 2.0], true))
-                .unwrap();
-            simulation.advance(500).unwrap();
-            samples(&mut simulation)
-        };
-        let (here, there) = (run(Vector3::zeros()), run(Vector3::new(0.31, 0.23, 0.37)));
-        let spun = here.iter().filter(|g| g.spin.norm() > 0.1).count();
-        assert!(spun > 100, "grains must have met: {spun}");
-        let off = here
-            .iter()
-            .zip(&there)
-            .map(|(a, b)| (a.spin - b.spin).norm());
-        let off = off.fold(0.0, f64::max);
-        println!("spins in two boxes: {off:.1e}");
-        assert!(off < 1e-6, "{off:e}");
-    }
+    let run = |by: Vector3<f64>| {
+        let mut simulation = in_moved_world(&shear(2, 8.0, false), by);
+        simulation.advance(400).unwrap();
+        simulation
+            .set_box_motion(stretch([-6.0, 0.0, 2.0], true))
+            .unwrap();
+        simulation.advance(500).unwrap();
+        samples(&mut simulation)
+    };
+    let (here, there) = (run(Vector3::zeros()), run(Vector3::new(0.31, 0.23, 0.37)));
+    let spun = here.iter().filter(|g| g.spin.norm() > 0.1).count();
+    assert!(spun > 100, "grains must have met: {spun}");
+    let off = here
+        .iter()
+        .zip(&there)
+        .map(|(a, b)| (a.spin - b.spin).norm());
+    let off = off.fold(0.0, f64::max);
+    println!("spins in two boxes: {off:.1e}");
+    assert!(off < 1e-6, "{off:e}");
 }
 
 #[test]

@@ -102,8 +102,23 @@ impl Seen<'_> {
     fn keeps(&self, axis: &Vector3<f64>) -> bool {
         match &self.turning {
             Turning::Not => true,
-            Turning::About(pivot) => pivot.cross(axis).norm() < ROUND_OFF,
+            Turning::About(pivot) => {
+                pivot.cross(axis).norm() < ROUND_OFF || self.is_round_about(pivot)
+            }
             Turning::Any => false,
+        }
+    }
+
+    /// Whether a turn about a vector leaves the surface as it is, wherever it takes its origin.
+    fn is_round_about(&self, pivot: &Vector3<f64>) -> bool {
+        let own = self.turn.inverse_transform_vector(pivot);
+        let about = |axis: &Vector3<f64>| axis.cross(&own).norm() < ROUND_OFF;
+        match self.shape {
+            Shape::Disk(disk) => about(&disk.axis),
+            Shape::Cylinder(cylinder) => about(&cylinder.axis),
+            Shape::Frustum(frustum) => about(&frustum.axis),
+            Shape::SphereShell(_) => true,
+            _ => false,
         }
     }
 

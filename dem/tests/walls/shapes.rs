@@ -1,8 +1,7 @@
 //! Resting shapes.
 
 use super::scene::*;
-use colluvium_dem::walls::Rotation;
-use colluvium_dem::walls::{Ends, Frustum};
+use colluvium_dem::walls::{Ends, Frustum, Rotation};
 use colluvium_dem::*;
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
