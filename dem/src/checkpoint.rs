@@ -4,7 +4,7 @@
 //! built again. The shorter list of pairs within reach is not: it changes no bits. Only contacts that
 //! touch have a history.
 
-use crate::contact::HISTORY_MAX;
+use crate::contact::{COEFFICIENTS, HISTORY_MAX};
 use crate::grains::Grains;
 use crate::grid::Grid;
 use crate::ledger::EnergyLedger;
@@ -95,10 +95,13 @@ impl Simulation {
         numbers("largest_overlap", vec![self.deepest]);
         let ledger = self.ledger.map(|ledger| ledger.numbers());
         numbers("energy_ledger", ledger.unwrap_or_default());
+        numbers("timestep", vec![self.timestep]);
+        numbers("law/coefficients", flatten(&self.law.table().rows));
         numbers("gravity", self.gravity.iter().copied().collect());
         let mut counts = |name: &str, values: Vec<u64>| {
             record.counts.insert(name.into(), values);
         };
+        counts("law/kind", self.law.kind().to_vec());
         counts("grains/id", wide(&self.grains.id));
         let material = self.grains.material[..n].iter().map(|&m| u64::from(m));
         let numbered = [self.setup_grains as u64, u64::from(self.next_id)];
@@ -131,7 +134,11 @@ impl Simulation {
         record
     }
 
-    /// Puts a simulation together from its setup and a checkpoint of it.
+    /// Puts a simulation together from its setup and a checkpoint of it. The setup's laws and step are those that
+    /// the run had when the checkpoint was taken.
+    ///
+    /// # Errors
+    /// If the setup is wrong, or the checkpoint is damaged or of another scene, law or step.
     pub fn resume(setup: Setup, record: &Record) -> Result<Simulation, SetupError> {
         let mut s = Simulation::unlisted(setup)?;
         s.read(record).map_err(SetupError::Record)?;
@@ -142,6 +149,7 @@ impl Simulation {
         let &[of_setup, next_id] = record.counts("grains/numbered")? else {
             return Err("array `grains/numbered` must have 2 numbers".into());
         };
+        self.compare(record)?;
         if of_setup != self.setup_grains as u64 {
             let grains = self.setup_grains;
             return Err(format!(
@@ -291,6 +299,34 @@ impl Simulation {
         self.read_walls(record)?;
         self.renew_rows();
         self.take_histories(touching, springs);
+        Ok(())
+    }
+
+    /// Refuses a checkpoint of a run under another step or other laws.
+    fn compare(&self, record: &Record) -> Result<(), String> {
+        let [step, own] = [sized(record, "timestep", 1)?[0], self.timestep];
+        if step.to_bits() != own.to_bits() {
+            return Err(format!(
+                "array `timestep` is of a run with steps of {step:e} s, not {own:e} s"
+            ));
+        }
+        if record.counts("law/kind")? != self.law.kind() {
+            return Err("array `law/kind` is of other kinds of laws than the scene's".into());
+        }
+        let rows = &self.law.table().rows;
+        let known = sized(record, "law/coefficients", COEFFICIENTS * rows.len())?;
+        let alike = |(a, b): (&f64, &f64)| a.to_bits() == b.to_bits();
+        if let Some(k) = known
+            .iter()
+            .zip(rows.iter().flatten())
+            .position(|both| !alike(both))
+        {
+            let (pair, n) = (k / COEFFICIENTS, self.law.materials());
+            let [a, b] = [pair / n, pair % n];
+            return Err(format!(
+                "array `law/coefficients` is of another law between the materials {a} and {b}"
+            ));
+        }
         Ok(())
     }
 

@@ -155,7 +155,9 @@ impl Cell {
         let mut v = Vector3::from_fn(|k, _| self.drift.speeds[k] / lengths[k] * away[k]);
         if self.drift.slip != 0.0 {
             let g = self.drift.gradient;
-            v.x += self.drift.slip / lengths[g] * away[g];
+            // What the offset grows by with the edge along x is no shear.
+            let with_edge = self.drift.offset * (self.drift.speeds[0] / lengths.x);
+            v.x += (self.drift.slip - with_edge) / lengths[g] * away[g];
         }
         v
     }

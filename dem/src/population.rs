@@ -4,6 +4,7 @@
 //! and never again. The momentum account takes in what comes and gives out what goes; an energy
 //! ledger that is open is opened anew.
 
+use crate::clumps::Clump;
 use crate::grains::{Grain, SPHERE_INERTIA, vector};
 use crate::setup::{SetupError, check_grains};
 use crate::simulation::Simulation;
@@ -18,10 +19,57 @@ impl Simulation {
     /// by half a kick of the forces of this instant, so that their first whole kick makes up for it.
     ///
     /// # Errors
-    /// If a number is out of its range, or a periodic box too narrow for a new grain. Nothing has
-    /// changed then.
+    /// If a number is out of its range, a periodic box too narrow for a new grain, or a fixed one is to come
+    /// into a box that moves. Nothing has changed then.
     pub fn insert(&mut self, grains: &[Grain]) -> Result<Range<u32>, SetupError> {
+        let ids = self.enter(grains)?;
+        if !ids.is_empty() {
+            if self.steps_since_start > 0 {
+                let new = self.places_of(|id| ids.contains(&id));
+                self.take_back(&new);
+            }
+            self.seat(|id| ids.contains(&id));
+        }
+        Ok(ids)
+    }
+
+    /// Puts in grains that move as clumps from the start; `clumps` count them from 0, the first of `grains`.
+    /// Returns their numbers. Members may overlap: forces are looked at when they are clumps.
+    ///
+    /// # Errors
+    /// Those of [`Simulation::insert`] and [`Simulation::clump`]. No grain has come then.
+    pub fn insert_clumped(
+        &mut self,
+        grains: &[Grain],
+        clumps: &[Clump],
+    ) -> Result<Range<u32>, SetupError> {
+        let (deepest, account) = (self.deepest, self.account);
+        let ids = self.enter(grains)?;
+        let numbered = |clump: &Clump| Clump {
+            // Beyond the last number there is no grain, which is refused.
+            grains: (clump.grains.iter().map(|k| ids.start.saturating_add(*k))).collect(),
+            ..clump.clone()
+        };
+        let numbered: Vec<Clump> = clumps.iter().map(numbered).collect();
+        if let Err(error) = self.clump(&numbered) {
+            self.remove(|grain| ids.contains(&grain.id));
+            // Nobody has booked them.
+            (self.deepest, self.account) = (deepest, account);
+            return Err(error);
+        }
+        if self.steps_since_start > 0 {
+            let new = self.places_of(|id| ids.contains(&id));
+            self.take_back(&new);
+        }
+        self.open_account();
+        Ok(ids)
+    }
+
+    /// Adds grains to the lists, with velocities as they are.
+    fn enter(&mut self, grains: &[Grain]) -> Result<Range<u32>, SetupError> {
         let [small, large] = self.admit(grains)?;
+        let fixed = grains.iter().filter(|grain| grain.fixed).count();
+        self.refuse_in_moving_box("grains: fixed ones, their number", fixed)?;
         if grains.is_empty() {
             return Ok(self.next_id..self.next_id);
         }
@@ -39,11 +87,6 @@ impl Simulation {
         self.grains.append(grains, ids.start);
         self.next_id = end;
         self.rebuild();
-        if self.steps_since_start > 0 {
-            let new = self.places_of(|id| ids.contains(&id));
-            self.take_back(&new);
-        }
-        self.seat(|id| ids.contains(&id));
         Ok(ids)
     }
 
@@ -109,13 +152,13 @@ impl Simulation {
         }
     }
 
-    /// Takes the velocities of grains half a step back.
+    /// Takes the velocities of grains, and of the clumps they are in, half a step back.
     fn take_back(&mut self, grains: &[usize]) {
         self.observe();
         let half = 0.5 * self.timestep;
         for &i in grains {
             let inverse_mass = self.grains.motion[i][3];
-            if inverse_mass == 0.0 {
+            if !self.moves_alone(i) {
                 continue;
             }
             let [force, torque, moment] = self.totals[i].map(|sum| vector(&sum));
@@ -126,6 +169,9 @@ impl Simulation {
                 self.grains.motion[i][k] -= back[k];
                 self.grains.turn[i][k] -= turn[k];
             }
+        }
+        if !self.clumps.is_empty() {
+            self.take_back_clumps(grains);
         }
         self.forget_observation();
     }

@@ -1,4 +1,4 @@
-//! The pairs within reach of touching, in batches of four, and the histories of those that touch.
+//! The pairs within reach of touching, in batches of eight, and the histories of those that touch.
 //!
 //! A second, shorter list under the Verlet list: pairs with a gap below a small share of a diameter.
 //! Pairs that do not touch take no part in sums, and those that do are summed in the order of the

@@ -292,17 +292,17 @@ impl Setup {
     pub(crate) fn validate(&self, skin: f64) -> Result<LawTable, SetupError> {
         let law = LawTable::new(&self.law)?;
         check("timestep", self.timestep, "> 0 s", |v| v > 0.0)?;
-        for (k, g) in self.gravity.iter().enumerate() {
-            check(&format!("gravity[{k}]"), *g, "finite, m/s²", |_| true)?;
-        }
+        check_gravity(&self.gravity)?;
         let materials = self.law.own.len();
         let largest = check_grains(&self.grains, materials)?;
         for (k, wall) in self.walls.iter().enumerate() {
             wall.validate(&format!("walls[{k}]"))?;
             known_material(wall.material, materials)?;
+            wall.check_images(&self.domain, &format!("walls[{k}]"))?;
         }
         for (k, body) in self.bodies.iter().enumerate() {
             body.validate(&format!("bodies[{k}]"), materials)?;
+            body.check_images(&self.domain, &format!("bodies[{k}]"))?;
         }
         check_box(&self.domain, largest, skin)?;
         Ok(law)
@@ -347,6 +347,11 @@ impl Setup {
             None => Ok(()),
         }
     }
+}
+
+pub(crate) fn check_gravity(gravity: &Vector3<f64>) -> Result<(), SetupError> {
+    let mut parts = gravity.iter().enumerate();
+    parts.try_for_each(|(k, g)| check(&format!("gravity[{k}]"), *g, "finite, m/s²", |_| true))
 }
 
 /// Beyond this a position counts as lost (m), and a square overflows.

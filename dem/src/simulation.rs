@@ -25,7 +25,7 @@ use crate::neighbours::Neighbours;
 use crate::places::Places;
 use crate::reach::Reach;
 use crate::rows::Rows;
-use crate::setup::{Setup, SetupError, Threads};
+use crate::setup::{Setup, SetupError, Threads, check_gravity};
 use crate::snapshot::GrainSample;
 use crate::sweep::{self, Pass, Sweep};
 use crate::team::OwnTeam;
@@ -407,7 +407,8 @@ impl Simulation {
         self.layout.slot_rows
     }
 
-    /// Sets the velocities of all free grains; spins and contacts stay.
+    /// Sets the velocities of all free grains; spins and contacts stay. A clump gets the momentum of its
+    /// members, less what its turning gives them.
     pub fn give_velocity(&mut self, mut f: impl FnMut(&GrainSample) -> Vector3<f64>) {
         self.wrap_grains();
         let samples = self.samples();
@@ -428,8 +429,13 @@ impl Simulation {
 
     /// Holds still every free grain for which `f` says so, with all others of its clump; it becomes part of the
     /// walls.
-    pub fn fix(&mut self, mut f: impl FnMut(&GrainSample) -> bool) {
+    ///
+    /// # Errors
+    /// If the box moves. Nothing has changed then.
+    pub fn fix(&mut self, mut f: impl FnMut(&GrainSample) -> bool) -> Result<(), SetupError> {
         let marks = self.marked(|sample| !sample.fixed && f(sample));
+        let count = marks.iter().filter(|&&marked| marked).count();
+        self.refuse_in_moving_box("grains to be fixed, their number", count)?;
         let mut any = false;
         self.drop_clumps(&marks);
         for (i, marked) in marks.into_iter().enumerate() {
@@ -444,6 +450,7 @@ impl Simulation {
             self.rebuild();
             self.open_account();
         }
+        Ok(())
     }
 
     /// Velocities now belong to the time of the positions, not to half a step before.
@@ -501,9 +508,14 @@ impl Simulation {
     }
 
     /// Changes gravity from the next step on; a schedule ends.
-    pub fn set_gravity(&mut self, gravity: Vector3<f64>) {
+    ///
+    /// # Errors
+    /// If a number is not finite. Nothing has changed then.
+    pub fn set_gravity(&mut self, gravity: Vector3<f64>) -> Result<(), SetupError> {
+        check_gravity(&gravity)?;
         self.fields.schedule = None;
         self.gravity = gravity;
+        Ok(())
     }
 
     /// Number of grains, fixed ones included.

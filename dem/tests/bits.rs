@@ -133,6 +133,23 @@ fn a_foreign_checkpoint_is_refused() {
     other.grains.pop();
     let message = Simulation::resume(other, &record).unwrap_err().to_string();
     assert!(message.contains("grains/numbered"), "{message}");
+    let mut other = setup(Threads::Serial);
+    other.timestep *= 0.5;
+    let message = Simulation::resume(other, &record).unwrap_err().to_string();
+    assert!(
+        message.contains("steps of 5e-4 s, not 2.5e-4 s"),
+        "{message}"
+    );
+    let mut other = setup(Threads::Serial);
+    if let Tangential::Linear(spring) = &mut other.law.own[0].tangential {
+        spring.friction += 0.1;
+    }
+    let message = Simulation::resume(other, &record).unwrap_err().to_string();
+    assert!(message.contains("materials 0 and 0"), "{message}");
+    let mut other = setup(Threads::Serial);
+    other.law.own[0].lever = Lever::Radius;
+    let message = Simulation::resume(other, &record).unwrap_err().to_string();
+    assert!(message.contains("law/kind"), "{message}");
     for name in record.numbers.keys() {
         let mut damaged = record.clone();
         damaged.numbers.remove(name);

@@ -553,3 +553,24 @@ fn a_spoilt_record_of_bonds_is_refused() {
     let cement = resumed(&|r| r.numbers.get_mut("bonds/cement").unwrap()[2] = -1.0);
     assert!(cement.is_err());
 }
+
+#[test]
+fn bonds_carry_what_rests_on_them() {
+    let mut grains = pair();
+    grains[1].fixed = true;
+    let mut setup = free_space(grains, 1e-4);
+    setup.gravity = -9.81 * Vector3::x();
+    let mut simulation = Simulation::new(setup).unwrap();
+    simulation.bond(&rule(cement())).unwrap();
+    let weight = simulation.free_mass() * 9.81;
+    // At the start nothing is stretched: all of the weight is left.
+    assert_eq!(simulation.rest_measures(9.81).unbalanced, f64::INFINITY);
+    simulation.advance(5).unwrap();
+    let mut seen = Snapshot::default();
+    simulation.snapshot(&mut seen);
+    let pull = seen.bonds[0].force.norm();
+    assert!(seen.contacts.is_empty() && pull > 0.0);
+    let left = simulation.rest_measures(9.81).unbalanced;
+    let expected = (weight - pull).abs() / pull;
+    assert!((left / expected - 1.0).abs() < 1e-9, "{left} {expected}");
+}

@@ -67,6 +67,13 @@ fn stream(motion: &BoxMotion, size: f64, away: &Vector3<f64>) -> Vector3<f64> {
 
 /// The same world seen from another box: moved along all axes, with the velocities that belong there.
 fn moved_world(motion: &BoxMotion, by: Vector3<f64>) -> Vec<GrainSample> {
+    let mut simulation = in_moved_world(motion, by);
+    simulation.advance(1000).unwrap();
+    assert!(simulation.list_builds() > 2);
+    samples(&mut simulation)
+}
+
+fn in_moved_world(motion: &BoxMotion, by: Vector3<f64>) -> Simulation {
     let mut setup = cloud(6, 0.12, 1.0, laws()[5].1);
     let size = setup.domain.upper.x;
     let center = Vector3::repeat(0.5 * size);
@@ -82,9 +89,7 @@ fn moved_world(motion: &BoxMotion, by: Vector3<f64>) -> Vec<GrainSample> {
     }
     let mut simulation = Simulation::new(setup).unwrap();
     simulation.set_box_motion(motion.clone()).unwrap();
-    simulation.advance(1000).unwrap();
-    assert!(simulation.list_builds() > 2);
-    samples(&mut simulation)
+    simulation
 }
 
 #[test]
@@ -121,6 +126,30 @@ fn contacts_across_a_moving_boundary_are_those_inside_the_box() {
             );
         }
     }
+}
+
+/// All images of a sheared box that stretches are alike: the world does not know where the box begins.
+#[test]
+fn a_box_that_was_sheared_stretches_its_offset_too() {
+    let run = |by: Vector3<f64>| {
+        let mut simulation = in_moved_world(&shear(2, 8.0, false), by);
+        simulation.advance(400).unwrap();
+        simulation
+            .set_box_motion(stretch([-6.0, 0.0, 2.0], true))
+            .unwrap();
+        simulation.advance(500).unwrap();
+        samples(&mut simulation)
+    };
+    let (here, there) = (run(Vector3::zeros()), run(Vector3::new(0.31, 0.23, 0.37)));
+    let spun = here.iter().filter(|g| g.spin.norm() > 0.1).count();
+    assert!(spun > 100, "grains must have met: {spun}");
+    let off = here
+        .iter()
+        .zip(&there)
+        .map(|(a, b)| (a.spin - b.spin).norm());
+    let off = off.fold(0.0, f64::max);
+    println!("spins in two boxes: {off:.1e}");
+    assert!(off < 1e-6, "{off:e}");
 }
 
 #[test]
@@ -398,6 +427,41 @@ fn what_cannot_move_is_refused() {
         !error.to_string().is_empty(),
         "a box that closes stops the run"
     );
+    // The same after the box has begun to move, and when it rests with an offset.
+    let mut sheared = Simulation::new(soft()).unwrap();
+    sheared.set_box_motion(shear(2, 1.0, true)).unwrap();
+    sheared.advance(10).unwrap();
+    for motion in [servo(), BoxMotion::Rest] {
+        sheared.set_box_motion(motion).unwrap();
+        let mut held = soft().grains[0];
+        held.fixed = true;
+        assert!(
+            sheared
+                .insert(&[held])
+                .unwrap_err()
+                .to_string()
+                .contains("fixed")
+        );
+        assert!(
+            sheared
+                .fix(|g| g.id == 1)
+                .unwrap_err()
+                .to_string()
+                .contains("fixed")
+        );
+        let clump = Clump {
+            grains: vec![1, 2],
+            mass: None,
+        };
+        assert!(
+            sheared
+                .clump(&[clump])
+                .unwrap_err()
+                .to_string()
+                .contains("clumps")
+        );
+        sheared.fix(|_| false).unwrap();
+    }
     let record = Simulation::new(soft()).unwrap().checkpoint();
     for (name, at) in [("box/motion", 0), ("box/motion", 3)] {
         let mut spoilt = record.clone();

@@ -207,7 +207,9 @@ fn gravity_follows_its_schedule() {
     );
     let ledger = simulation.energy_ledger().unwrap();
     assert!(ledger.error() < 1e-12 && simulation.momentum_error() < 1e-12);
-    simulation.set_gravity(Vector3::zeros());
+    simulation.set_gravity(Vector3::zeros()).unwrap();
+    let odd = simulation.set_gravity(Vector3::x() * f64::NAN).unwrap_err();
+    assert!(odd.to_string().contains("gravity[0]"), "{odd}");
     simulation.advance(1).unwrap();
     assert_eq!(simulation.gravity(), Vector3::zeros());
 }

@@ -1,7 +1,7 @@
 //! Beds that settle on a rough base.
 
 use colluvium_dem::preparation::{InclineBed, RadiusLaw, settle_incline_bed};
-use colluvium_dem::{ContactLaw, Hooke, ShapeParameter, TangentialSpring, Threads};
+use colluvium_dem::{ContactLaw, Hooke, ShapeParameter, Tangential, TangentialSpring, Threads};
 use std::ops::ControlFlow;
 
 /// Moderate-friction grains in units of d, mean mass and g.
@@ -59,4 +59,21 @@ fn the_seed_decides_the_bed() {
     };
     assert_eq!(settle(1).grains, settle(1).grains);
     assert_ne!(settle(1).grains, settle(2).grains);
+}
+
+#[test]
+fn a_bed_that_does_not_come_to_rest_is_refused() {
+    let mut spec = spec(3);
+    (spec.grains, spec.length, spec.width, spec.timestep) = (4, 3.0, 3.0, 4e-3);
+    spec.law = ContactLaw {
+        tangential: Tangential::None,
+        ..ContactLaw::linear(
+            Hooke::matched(1e3, 1.0),
+            TangentialSpring::matched(2.0 / 7.0, 1.0, 0.0),
+            None,
+        )
+    };
+    let error = settle_incline_bed(&spec, Threads::Serial, &mut |_| ControlFlow::Continue(()));
+    let error = error.unwrap_err().to_string();
+    assert!(error.contains("not at rest after 400"), "{error}");
 }

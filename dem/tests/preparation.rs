@@ -192,6 +192,18 @@ fn a_mixture_has_its_parts_by_volume() {
     assert_eq!(insert_loose(&spec, &[]).unwrap().0.len(), grains.len());
 }
 
+#[test]
+fn a_cut_that_few_draws_meet_is_refused() {
+    let law = |cut| RadiusLaw::Gaussian {
+        mean: 1.0,
+        relative_deviation: 0.1,
+        cut,
+    };
+    law(0.01).validate().unwrap();
+    let error = law(0.009).validate().unwrap_err().to_string();
+    assert!(error.contains("cut_deviations = 0.009"), "{error}");
+}
+
 /// Units of d, mean mass and g = 1.
 fn rough(friction: f64) -> ContactLaw {
     ContactLaw::linear(

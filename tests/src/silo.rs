@@ -322,7 +322,7 @@ impl Hopper {
                 .any(|g| !g.fixed && g.position.z < CATCH)
             {
                 // Held where they are, well below and apart from what still falls.
-                simulation.fix(|g| g.position.z < CATCH);
+                simulation.fix(|g| g.position.z < CATCH)?;
             }
         }
         Ok(times)

@@ -1,5 +1,6 @@
 //! Bodies in the step, in the accounts of momentum and in the energy ledger.
 
+use super::Freedom;
 use super::contacts::twist_of;
 use super::rigid::Twist;
 use crate::energy::Energy;
@@ -80,6 +81,27 @@ impl Simulation {
             energy.rolling += stored.rolling;
             energy.twisting += stored.twisting;
         });
+    }
+
+    /// Shows for each body that forces move its kinetic energy (J), the force that is left of all that acts on it
+    /// (N; of a hinged one the torque about its hinge over the reach of its parts), twice that reach (m) and its
+    /// mass (kg). Returns how many there are.
+    pub(crate) fn each_body_at_rest(&self, mut see: impl FnMut([f64; 4])) -> usize {
+        let half = self.half_step();
+        let yielding = self.bodies.rigid.iter().filter(|body| !body.is_driven());
+        let mut count = 0;
+        for body in yielding {
+            let [translation, rotation] = body.kinetic(&body.kicked(half, &self.gravity));
+            let [force, torque] = body.wrench(&self.gravity);
+            let reach = body.body.reach();
+            let left = match &body.body.freedom {
+                Freedom::Hinged(hinge) => torque.dot(&hinge.axis).abs() / reach,
+                _ => force.norm(),
+            };
+            see([translation + rotation, left, 2.0 * reach, body.mass.mass]);
+            count += 1;
+        }
+        count
     }
 
     /// Potential energy of bodies in fields that differ from place to place (J).

@@ -333,14 +333,15 @@ impl Bodies {
             let shifts = || s.iter().zip(t.iter());
             shifts().fold(a.cmp(b), |order, (a, b)| order.then(a.total_cmp(b)))
         });
-        let mut offers = Offers::none();
-        for ((triangle, shift), number) in near.iter().zip(0..) {
-            let centre = target.pose.inward(&(x + shift - target.pose.position));
-            if let Some(foot) = mesh.offer(*triangle, &centre, reach + self.hold) {
-                offers.take(foot, number);
+        let contacts = Offers::contacts(reach, |offers| {
+            for ((triangle, shift), number) in near.iter().zip(0..) {
+                let centre = target.pose.inward(&(x + shift - target.pose.position));
+                if let Some(foot) = mesh.offer(*triangle, &centre, reach + self.hold) {
+                    offers.take(foot, number, reach);
+                }
             }
-        }
-        for (foot, number) in offers.contacts(reach).feet() {
+        });
+        for (foot, number) in contacts.feet() {
             let seen = x + near[*number as usize].1 - target.pose.position;
             let foot = Foot {
                 distance: foot.distance - target.rounding,
@@ -466,6 +467,11 @@ impl Bodies {
         });
         // Of a ball the radius is the scale, of others the way from the surface to the sharp core.
         overlap / (radius + walls[b].rounding)
+    }
+
+    /// Forces of the contacts of bodies with walls and with each other (N).
+    pub fn forces(&self) -> impl Iterator<Item = f64> {
+        self.contacts.iter().map(|contact| contact.force.norm())
     }
 
     /// Takes up contacts of a checkpoint.

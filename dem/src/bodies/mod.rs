@@ -42,8 +42,9 @@ pub(crate) use step_limits::feeling_parts;
 #[cfg(test)]
 pub(crate) use top::turn;
 
+use crate::domain::Domain;
 use crate::setup::{SetupError, check, known_material};
-use crate::walls::{Mesh, Motion, Pose};
+use crate::walls::{Mesh, Motion, Pose, Seen, Turning};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::sync::Arc;
 
@@ -304,6 +305,34 @@ impl Body {
         check(&key("spin"), across, "along the axis of the hinge", |s| {
             s <= 1e-9 * spin
         })
+    }
+
+    /// Distance of its farthest point from its own origin, at most (m).
+    pub(crate) fn reach(&self) -> f64 {
+        let parts = self.parts.iter();
+        let parts = parts.map(|part| part.pose.position.norm() + part.solid.extent());
+        parts.fold(0.0, f64::max)
+    }
+
+    /// Refuses a part of which a periodic box would show no images where there are some.
+    pub(crate) fn check_images(&self, domain: &Domain, key: &str) -> Result<(), SetupError> {
+        let turning = match &self.freedom {
+            Freedom::Free => Turning::Any,
+            Freedom::Hinged(hinge) => Turning::About(hinge.axis),
+            Freedom::Driven(motion) => motion.turning(),
+        };
+        for (k, part) in self.parts.iter().enumerate() {
+            let turn = self.pose.orientation * part.pose.orientation;
+            let core = rounded::core(part);
+            let seen = Seen {
+                shape: &core.shape,
+                rounding: core.rounding,
+                turn,
+                turning,
+            };
+            seen.check(domain, &format!("{key}.parts[{k}]"))?;
+        }
+        Ok(())
     }
 
     fn validate_driven(&self, motion: &Motion, key: &str) -> Result<(), SetupError> {

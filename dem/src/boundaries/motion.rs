@@ -2,10 +2,10 @@
 //!
 //! The box grows and shrinks about its centre, and shears along x. An image n boxes away along axis k
 //! moves against the grain itself by `n dL_k/dt`; sheared, one above along the axis g by `γ̇ L_g` along x
-//! (Lees & Edwards 1972). Newton's equations are those of the space outside: nothing but contacts across
-//! the boundary and grains that cross it brings the motion in. A grain that crosses changes its velocity
-//! by that of the image (Tatsuuma et al. 2019, Eq. 12–15), in the lists' own time: until they are built
-//! anew it is known by an image of its own.
+//! (Lees & Edwards 1972); an offset that is left stretches with the edge along x. Newton's equations are
+//! those of the space outside: nothing but contacts across the boundary and grains that cross it brings
+//! the motion in. A grain that crosses changes its velocity by that of the image (Tatsuuma et al. 2019,
+//! Eq. 12–15), in the lists' own time: until they are built anew it is known by an image of its own.
 //!
 //! Where the rate changes, grains may be *carried*: each is kicked by the change of the velocity that
 //! uniform deformation has at its place. All images then stay alike. Without that, grains are taken into
@@ -328,6 +328,20 @@ impl Simulation {
         Ok(())
     }
 
+    /// Refuses so many things that have no images which could move, if the box moves or is sheared.
+    pub(crate) fn refuse_in_moving_box(&self, key: &str, number: usize) -> Result<(), SetupError> {
+        let moving = &self.moving_box;
+        if moving.motion == BoxMotion::Rest && !moving.drift.moves() {
+            return Ok(());
+        }
+        check(
+            key,
+            number as f64,
+            "0 in a box that moves or is sheared",
+            |n| n == 0.0,
+        )
+    }
+
     /// Reads the box of a checkpoint.
     pub(crate) fn read_box(&mut self, record: &Record) -> Result<(), String> {
         let mut cell = self.cell();
@@ -354,7 +368,9 @@ impl Simulation {
         }
         let length = self.domain.lengths().x;
         drift.offset += self.timestep * drift.slip;
-        drift.offset -= length * (drift.offset / length).round();
+        let turns = (drift.offset / length).round();
+        drift.offset -= length * turns;
+        drift.slip -= drift.speeds[0] * turns;
     }
 
     /// Gives the box its speeds for the next step.
@@ -363,17 +379,17 @@ impl Simulation {
         match &self.moving_box.motion {
             BoxMotion::Rest => (next.speeds, next.slip) = ([0.0; 3], 0.0),
             BoxMotion::Stretch { edges, .. } => {
-                next.slip = 0.0;
                 let (time, step) = (self.time(), self.timestep);
                 next.speeds = [0, 1, 2].map(|k| edges[k].speed(time, step, lengths[k]));
+                next.slip = self.affine_slip(next.speeds[0]);
             }
             BoxMotion::Servo(servo) if self.steps.is_multiple_of(servo.every) => {
                 let servo = *servo;
                 let pressure = -self.stress().trace() / 3.0;
                 self.forget_observation();
                 let share = (servo.pressure - pressure) / servo.pressure;
-                next.slip = 0.0;
                 next.speeds = (lengths * (-servo.rate * share.clamp(-1.0, 1.0))).into();
+                next.slip = self.affine_slip(next.speeds[0]);
             }
             BoxMotion::Servo(_) => return,
             BoxMotion::Shear { across, rate, .. } => {
@@ -383,6 +399,20 @@ impl Simulation {
         }
         if next != self.moving_box.drift {
             self.change_drift(next);
+        }
+    }
+
+    /// How fast the offset of earlier shear grows where the edge along x does at a speed (m/s): with it, as all
+    /// lengths along x do, d(offset)/dt = offset (dL_x/dt)/L_x.
+    fn affine_slip(&self, speed: f64) -> f64 {
+        let now = &self.moving_box.drift;
+        if now.offset == 0.0 || speed == 0.0 {
+            0.0
+        } else if speed == now.speeds[0] {
+            // Both have been on straight lines through the same share.
+            now.slip
+        } else {
+            now.offset * speed / self.domain.lengths().x
         }
     }
 

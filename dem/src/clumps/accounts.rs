@@ -90,6 +90,28 @@ impl Simulation {
             .sum()
     }
 
+    /// Shows for each clump its mass (kg), its centre (m) and its velocity at this instant (m/s).
+    pub(crate) fn each_clump_now(&self, mut see: impl FnMut(f64, &Vector3<f64>, Vector3<f64>)) {
+        let half = self.half_step();
+        for (state, members) in self.clumps.all() {
+            let (velocity, _) = self.clump_kicked(state, members, half);
+            see(state.mass, &state.place, velocity);
+        }
+    }
+
+    /// For each row the way to its grain from the centre of its clump (m), zero for those in none; nothing
+    /// where there are no clumps.
+    pub(crate) fn member_arms(&self) -> Vec<Vector3<f64>> {
+        if self.clumps.is_empty() {
+            return Vec::new();
+        }
+        let mut arms = vec![Vector3::zeros(); self.grains.len()];
+        for member in self.clumps.all().flat_map(|(_, members)| members) {
+            arms[member.row as usize] = member.arm;
+        }
+        arms
+    }
+
     /// Angular momentum of all clumps about the origin as the integrator holds it (N m s).
     pub(crate) fn clump_angular_momentum(&self) -> Vector3<f64> {
         let own = |(state, _): (&State, &[Member])| {

@@ -52,18 +52,41 @@ impl Simulation {
         self.lay_clump_rows();
     }
 
-    /// Brings motions to the time of places and gives each clump the mean of what its members are to have.
+    /// Brings motions to the time of places and gives each clump the momentum of what its members are to have
+    /// beside its turning, V = Σ m (v - ω × r)/M: members that are given what they have change nothing.
     pub(crate) fn launch_clumps(&mut self, given: &[Vector3<f64>]) {
         let half = self.half_step();
         let own = |(state, members): (&State, &[Member])| {
             let (_, momentum) = self.clump_kicked(state, members, half);
-            let velocities = members.iter().map(|m| given[m.row as usize]);
-            let mean = velocities.sum::<Vector3<f64>>() / members.len() as f64;
-            (mean, momentum)
+            let spin = state.spin(&momentum);
+            let share = |m: &Member| {
+                let row = m.row as usize;
+                self.grains.mass[row] * (given[row] - spin.cross(&m.arm))
+            };
+            let sum: Vector3<f64> = members.iter().map(share).sum();
+            (sum / state.mass, momentum)
         };
         let motions: Vec<_> = self.clumps.all().map(own).collect();
         for ((state, _), motion) in self.clumps.all_mut().zip(motions) {
             (state.velocity, state.momentum) = motion;
+        }
+        self.lay_clump_rows();
+    }
+
+    /// Takes the motions of clumps that have members in these rows half a step back, by the forces of now.
+    pub(crate) fn take_back_clumps(&mut self, rows: &[usize]) {
+        let half = 0.5 * self.timestep;
+        let mut new: Vec<u32> = rows.iter().filter_map(|&i| self.clumps.of(i)).collect();
+        new.sort_unstable();
+        new.dedup();
+        if new.is_empty() {
+            return;
+        }
+        for clump in new {
+            let (state, members) = self.clumps.one(clump as usize);
+            let back = self.clump_kicked(state, members, -half);
+            let state = self.clumps.state_mut(clump as usize);
+            (state.velocity, state.momentum) = back;
         }
         self.lay_clump_rows();
     }

@@ -15,9 +15,7 @@ impl Simulation {
     /// If a grain is not there, is fixed, or is in a clump already, a clump has no grains, no distribution of
     /// mass has such an inertia, or the box moves. Nothing has changed then.
     pub fn clump(&mut self, clumps: &[Clump]) -> Result<(), SetupError> {
-        let moves = f64::from(u8::from(self.moving_box.drift.moves()));
-        let word = "a box at rest: clumps do not go through boundaries that move";
-        check("clumps: speed of the box", moves, word, |m| m == 0.0)?;
+        self.refuse_in_moving_box("clumps, their number", clumps.len())?;
         let mut rows: Vec<u32> = vec![ALONE; self.next_id as usize];
         for (row, &id) in self.grains.id.iter().enumerate() {
             let free = !self.grains.is_fixed(row) && !self.clumps.carry(row);

@@ -136,11 +136,18 @@ impl Clumps {
         self.of_row.get(row).is_some_and(|&clump| clump != ALONE)
     }
 
+    /// Clump of a row, in the order of [`Clumps::all`].
+    fn of(&self, row: usize) -> Option<u32> {
+        self.of_row
+            .get(row)
+            .copied()
+            .filter(|&clump| clump != ALONE)
+    }
+
     /// Number of the clump that carries the grain of a row: that of its first grain.
     #[inline(always)]
     pub fn number(&self, row: usize) -> Option<u32> {
-        let clump = *self.of_row.get(row).filter(|&&clump| clump != ALONE)?;
-        Some(self.one(clump as usize).1[0].grain)
+        Some(self.one(self.of(row)? as usize).1[0].grain)
     }
 
     /// A clump with its members.
@@ -148,6 +155,10 @@ impl Clumps {
         let group = &self.groups[clump / self.each];
         let state = &group.states[clump % self.each];
         (state, &group.members[state.members.clone()])
+    }
+
+    fn state_mut(&mut self, clump: usize) -> &mut State {
+        &mut self.groups[clump / self.each].states[clump % self.each]
     }
 
     /// Rows of members that follow each other in their clump.

@@ -33,6 +33,14 @@ impl State {
 }
 
 impl Simulation {
+    /// Shows for each member its row and the mass that a push on a grain of its clump feels at the least (kg).
+    pub(crate) fn each_lightest(&self, mut see: impl FnMut(usize, f64)) {
+        for (state, own) in self.clumps.all() {
+            let least = lightest(&state.properties(), own.iter().map(|member| member.arm));
+            own.iter().for_each(|m| see(m.row as usize, least));
+        }
+    }
+
     /// All clumps as they are now, in the order in which they were made, each with the mass that a push on one
     /// of its grains feels at the least (kg).
     pub fn clump_list(&self) -> Vec<(Clump, f64)> {

@@ -15,7 +15,7 @@ use super::{
     Mindlin, Normal, Rolling, ShapeParameter, SpringStiffness, Tangential, TangentialSpring,
     Viscoelastic,
 };
-use crate::setup::SetupError;
+use crate::setup::{SetupError, check};
 
 /// Numbers of all pairs, as the inner loop reads them.
 #[derive(Clone, Debug, Default, PartialEq)]
@@ -76,6 +76,10 @@ impl LawTable {
                     materials: n,
                 });
             }
+            let alike = |p: &&(usize, usize, ContactLaw)| [(a, b), (b, a)].contains(&(p.0, p.1));
+            let times = given.pairs.iter().filter(alike).count() as f64;
+            let key = format!("contact: laws given for the materials {a} and {b}, their number");
+            check(&key, times, "1", |n| n == 1.0)?;
         }
         LawTable::pairs(n, laws)
     }
@@ -120,6 +124,15 @@ impl LawTable {
     /// Where the contact point lies.
     pub fn lever(&self) -> Lever {
         self.laws[0].lever
+    }
+
+    /// What coefficients do not tell: parts, lever arm and number of materials.
+    pub(crate) fn kind(&self) -> [u64; 3] {
+        [
+            self.composition as u64,
+            self.lever() as u64,
+            self.table.materials as u64,
+        ]
     }
 
     pub(crate) fn table(&self) -> &Table {
@@ -390,6 +403,21 @@ mod tests {
         // Coefficients of the part that only one has are zero for the others.
         assert_eq!(table.table().rows[3][6..9], [0.0; 3]);
         assert!(table.table().rows[0][7] > 0.0);
+    }
+
+    #[test]
+    fn a_pair_that_is_given_twice_is_refused() {
+        let a = ContactLaw::hertz_mindlin(SOFT, 0.5, 0.3);
+        let b = ContactLaw::hertz_mindlin(STEEL, 0.6, 0.5);
+        let own = vec![a, b];
+        for pairs in [vec![(0, 1, a), (1, 0, b)], vec![(1, 1, a), (1, 1, a)]] {
+            let twice = LawTable::new(&Laws {
+                own: own.clone(),
+                pairs,
+            });
+            let error = twice.unwrap_err().to_string();
+            assert!(error.contains("their number = 2"), "{error}");
+        }
     }
 
     #[test]

@@ -1,4 +1,4 @@
-//! Numbers that are one contact wide or four contacts wide.
+//! Numbers that are one contact wide, or four or eight contacts wide.
 //!
 //! Contact laws are written once, for any [`Lane`]: with `f64` they serve walls and tests, with
 //! [`Lanes`] of four or eight they serve batches of pairs. All implementations use the same correctly

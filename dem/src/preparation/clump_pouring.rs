@@ -61,11 +61,10 @@ pub fn pour_clumps(
             .iter()
             .flat_map(|pose| shape.grains(pose, spec.velocity))
             .collect();
-        let first = simulation.insert(&grains)?.start;
         let balls = shape.balls.len() as u32;
-        let clump = |(pose, k)| shape.clump(pose, first + balls * k);
+        let clump = |(pose, k)| shape.clump(pose, balls * k);
         let clumps: Vec<_> = poses.iter().zip(0..).map(clump).collect();
-        simulation.clump(&clumps)
+        simulation.insert_clumped(&grains, &clumps).map(|_| ())
     };
     let mut report = pour_by(simulation, &hulls, relaxation, watch, &mut enter)?;
     report.sizes.clear();

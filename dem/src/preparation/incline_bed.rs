@@ -3,7 +3,7 @@
 //! Loose grains fall on a floor to which the first ones stick: a rough base made of the flow's own
 //! grains (Thuillet 2019, §2.3.2). The rest settles on it under gravity normal to the floor.
 
-use super::RadiusLaw;
+use super::{RadiusLaw, Rest};
 use crate::contact::ContactLaw;
 use crate::domain::Domain;
 use crate::grains::Grain;
@@ -83,6 +83,9 @@ const LOOK_EVERY: u64 = 20;
 ///
 /// `progress` gets the share of the work done so far (an estimate) and may stop it. The same seed
 /// gives the same bed.
+///
+/// # Errors
+/// If a number is out of its range, the grains do not come to rest in time, or too many of them stick.
 pub fn settle_incline_bed(
     spec: &InclineBed,
     threads: Threads,
@@ -111,7 +114,7 @@ pub fn settle_incline_bed(
     loop {
         for _ in 0..10 {
             simulation.advance(LOOK_EVERY)?;
-            simulation.fix(|g| g.position.z < g.radius);
+            simulation.fix(|g| g.position.z < g.radius)?;
         }
         kinetic = simulation.energy().kinetic() / scale;
         // Kinetic energy falls by decades once the cloud has landed: its logarithm measures progress.
@@ -120,11 +123,27 @@ pub fn settle_incline_bed(
             return Err(SetupError::Interrupted);
         }
         let landed = simulation.time() > 8.0 * time_unit;
-        if (landed && kinetic < AT_REST) || simulation.steps_done() > longest {
+        if landed && kinetic < AT_REST {
             break;
         }
+        if simulation.steps_done() > longest {
+            return Err(SetupError::Restless {
+                measures: Box::new(simulation.rest_measures(spec.gravity)),
+                asked: Rest {
+                    kinetic: AT_REST,
+                    unbalanced: f64::INFINITY,
+                },
+                patience: PATIENCE,
+            });
+        }
     }
-    Ok(collect(spec, &mut simulation, kinetic))
+    let bed = collect(spec, &mut simulation, kinetic);
+    let found = bed.report.grains as f64;
+    let word = "as many as asked for: more than the floor can hold have stuck to it";
+    check("grains.count, free ones over the base", found, word, |n| {
+        n == spec.grains as f64
+    })?;
+    Ok(bed)
 }
 
 /// A lattice of grains without contacts, shaken a little; more than asked for, since some will stick.

@@ -2,8 +2,10 @@
 //!
 //! ```text
 //! kinetic     Σ (m v²/2 + I ω²/2) / Σ m a d̄       free grains; a acceleration, d̄ mean diameter
-//! unbalanced  ⟨|F|⟩ / ⟨|F_c|⟩                      F whole force on a grain, F_c force of a contact
+//! unbalanced  ⟨|F|⟩ / ⟨|F_c|⟩                      F whole force on a grain, F_c force of a contact or bond
 //! ```
+//! A clump counts as one grain, and so does a body that forces move: of the diameter of its farthest point.
+//!
 //! The first says how far the grains could still be thrown, in diameters; the second goes to zero only
 //! where every grain is carried.
 
@@ -68,7 +70,6 @@ impl Simulation {
         let free: Vec<usize> = (0..self.grains.len())
             .filter(|&i| self.moves_alone(i))
             .collect();
-        let count = (free.len() + self.clump_count()).max(1) as f64;
         let (mut kinetic, mut left, mut diameters, mut mass) = (0.0, 0.0, 0.0, 0.0);
         for &i in &free {
             let (v, w) = self.synchronised(i);
@@ -85,6 +86,13 @@ impl Simulation {
             diameters += diameter;
             mass += m;
         });
+        let bodies = self.each_body_at_rest(|[energy, force, diameter, m]| {
+            kinetic += energy;
+            left += force;
+            diameters += diameter;
+            mass += m;
+        });
+        let count = (free.len() + self.clump_count() + bodies).max(1) as f64;
         let rows = self.slot_rows();
         let pushes = self
             .reach
@@ -92,6 +100,8 @@ impl Simulation {
             .map(|(chunk, k)| vector(&chunk.slots[k * rows]).norm());
         let walls = self.wall_contacts.touching();
         let pushes = pushes.chain(walls.map(|c| vector(&c.slot[0]).norm()));
+        let pushes = pushes.chain(self.bodies.forces());
+        let pushes = pushes.chain(self.bonds.whole().map(|bond| bond.pull.force.norm()));
         let (sum, contacts) = pushes
             .filter(|&f| f > 0.0)
             .fold((0.0, 0_u64), |(sum, n), f| (sum + f, n + 1));

@@ -133,8 +133,9 @@ impl RadiusLaw {
                 check(
                     "grains.cut_deviations",
                     cut,
-                    "> 0, and cut · deviation < 1",
-                    |v| v > 0.0 && v * relative_deviation < 1.0,
+                    "≥ 0.01, and cut · deviation < 1",
+                    // Drawn again 125 times a grain in the mean, and without end as it goes to zero.
+                    |v| v >= 0.01 && v * relative_deviation < 1.0,
                 )
             }
             &RadiusLaw::Uniform { low, high } => between(low, high),

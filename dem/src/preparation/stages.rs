@@ -12,7 +12,7 @@ use super::stiffness::{self, MeanGrain};
 use crate::clumps::Clump;
 use crate::contact::{LawTable, Laws};
 use crate::grains::Grain;
-use crate::setup::{Setup, SetupError, check};
+use crate::setup::{Setup, SetupError, check, check_gravity};
 use crate::simulation::Simulation;
 use crate::timestep::{self, Conditions, Shares};
 use nalgebra::Vector3;
@@ -235,9 +235,7 @@ impl Simulation {
     ) -> Result<(), SetupError> {
         let table = LawTable::new(laws)?;
         check("timestep", timestep, "> 0 s", |v| v > 0.0)?;
-        for (k, g) in gravity.iter().enumerate() {
-            check(&format!("gravity[{k}]"), *g, "finite, m/s²", |_| true)?;
-        }
+        check_gravity(&gravity)?;
         if table.composition() != self.law.composition()
             || table.materials() != self.law.materials()
         {
@@ -256,7 +254,7 @@ impl Simulation {
         // Velocities come to the time of the positions, where the new step can start from.
         self.give_velocity(|grain| grain.velocity);
         self.set_laws(table);
-        self.set_gravity(gravity);
+        self.set_gravity(gravity)?;
         self.timestep = timestep;
         self.steps = 0;
         self.deepest = 0.0;

@@ -134,11 +134,16 @@ impl Simulation {
     }
 
     /// What limits the step: classes of grains alike, and the walls.
+    ///
+    /// A member counts with the mass that a push on it feels at the least, by its lever; and at most with its
+    /// share of its clump's, for all members may be pushed at once.
     pub(crate) fn classes(&self) -> Classes {
+        let mut masses = self.grains.mass.clone();
+        self.each_lightest(|row, least| masses[row] = least.min(masses[row]));
         let bodies = (0..self.grains.len()).map(|i| Body {
             material: self.grains.material[i],
             radius: self.grains.place[i][3],
-            mass: self.grains.mass[i],
+            mass: masses[i],
             fixed: self.grains.is_fixed(i),
         });
         let walls = self.walls.iter().filter(|w| w.carrier.is_none());
@@ -173,5 +178,59 @@ impl Simulation {
             limit: choice_now.binding,
             exceeded: self.timestep > choice_now.seconds,
         }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::setup::{Setup, Threads};
+    use crate::{Clump, ContactLaw, Domain, Grain, Hooke, TangentialSpring};
+    use nalgebra::Vector3;
+
+    #[test]
+    fn a_member_limits_the_step_with_what_a_push_on_it_moves() {
+        // A heavy ball with a light one far out: pushes there meet little of the mass.
+        let grain = |x: f64, radius| Grain::at_rest(Vector3::x() * x, radius, 1000.0);
+        let grains = vec![grain(0.0, 0.1), grain(0.5, 0.099)];
+        let law = ContactLaw::linear(
+            Hooke::matched(1e5, 0.5),
+            TangentialSpring::matched(2.0 / 7.0, 0.5, 0.5),
+            None,
+        );
+        let mut world = Simulation::new(Setup {
+            domain: Domain {
+                lower: Vector3::repeat(-1.0),
+                upper: Vector3::repeat(1.0),
+                periodic: [false; 3],
+            },
+            gravity: Vector3::zeros(),
+            law: law.into(),
+            grains,
+            walls: Vec::new(),
+            bodies: Vec::new(),
+            timestep: 1e-4,
+            threads: Threads::Serial,
+        })
+        .unwrap_or_else(|e| panic!("{e}"));
+        let lightest = |world: &Simulation| {
+            let bodies = world.classes().bodies.into_iter();
+            bodies.map(|b| b.mass).fold(f64::INFINITY, f64::min)
+        };
+        let apart = lightest(&world);
+        // Of a mass that is all in the middle the far ball has next to no inertia beside it.
+        let mass = crate::MassProperties {
+            mass: 8.0,
+            centre: Vector3::zeros(),
+            inertia: nalgebra::Matrix3::identity() * 0.032,
+        };
+        let clump = Clump {
+            grains: vec![0, 1],
+            mass: Some(mass),
+        };
+        world.clump(&[clump]).unwrap_or_else(|e| panic!("{e}"));
+        let expected = 1.0 / (1.0 / 8.0 + 0.25 / 0.032);
+        assert!(expected < 0.1 * apart);
+        assert!((lightest(&world) / expected - 1.0).abs() < 1e-12);
     }
 }

@@ -466,16 +466,17 @@ fn meet_mesh<I: Interaction>(
     };
     let radius = x[3] + wall.rounding;
     let seen = |near: &Near| vector(x) + near.shift - wall.pose.position;
-    let mut offers = Offers::none();
-    if let Shape::Mesh(mesh) = &wall.wall.shape {
+    let contacts = Offers::contacts(radius, |offers| {
+        let Shape::Mesh(mesh) = &wall.wall.shape else {
+            return;
+        };
         for (near, number) in near.iter().zip(0..) {
             let centre = wall.pose.inward(&seen(near));
             if let Some(foot) = mesh.offer(near.triangle, &centre, radius + held) {
-                offers.take(foot, number);
+                offers.take(foot, number, radius);
             }
         }
-    }
-    let contacts = offers.contacts(radius);
+    });
     let mut deepest: f64 = 0.0;
     for (row, (foot, number)) in rows.iter_mut().zip(contacts.feet()) {
         let seen = vector(x) + near[*number as usize].shift - wall.pose.position;

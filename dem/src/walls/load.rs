@@ -1,6 +1,6 @@
 //! What grains and bodies do to a wall.
 
-use super::{Pose, Wall};
+use super::{Pose, Standing, Wall};
 use crate::simulation::Simulation;
 use nalgebra::Vector3;
 
@@ -49,7 +49,12 @@ impl WallImpulse {
 }
 
 impl Simulation {
-    /// Number of walls.
+    /// Walls alone; parts of bodies stand behind them.
+    fn standing(&self) -> &[Standing] {
+        &self.walls[..self.wall_count()]
+    }
+
+    /// Number of walls. The others of these functions panic on a number that is not below it.
     pub fn wall_count(&self) -> usize {
         let standing = self.walls.iter().filter(|wall| wall.carrier.is_none());
         standing.count()
@@ -57,32 +62,34 @@ impl Simulation {
 
     /// A wall as it was set up.
     pub fn wall(&self, wall: usize) -> &Wall {
-        &self.walls[wall].wall
+        &self.standing()[wall].wall
     }
 
     /// Where a wall is now.
     pub fn wall_pose(&self, wall: usize) -> Pose {
-        self.walls[wall].pose
+        self.standing()[wall].pose
     }
 
     /// Mean velocity of a wall's origin over the last step (m/s), and its angular velocity (rad/s).
     pub fn wall_velocity(&self, wall: usize) -> [Vector3<f64>; 2] {
-        [self.walls[wall].velocity, self.walls[wall].spin]
+        let wall = &self.standing()[wall];
+        [wall.velocity, wall.spin]
     }
 
     /// Force and torque of grains and bodies on a wall at this instant.
     pub fn wall_load(&mut self, wall: usize) -> WallLoad {
         self.observe();
-        self.walls[wall].load
+        self.standing()[wall].load
     }
 
     /// What a wall has taken since the start, or since [`Simulation::forget_wall_taken`].
     pub fn wall_taken(&self, wall: usize) -> WallImpulse {
-        self.walls[wall].impulse
+        self.standing()[wall].impulse
     }
 
     /// Starts a new interval of [`Simulation::wall_taken`] for a wall.
     pub fn forget_wall_taken(&mut self, wall: usize) {
-        self.walls[wall].impulse = WallImpulse::default();
+        let walls = self.wall_count();
+        self.walls[..walls][wall].impulse = WallImpulse::default();
     }
 }

@@ -1,6 +1,7 @@
 //! Bodies at rest, sliding, rolling and piled up.
 
 use super::scene::*;
+use colluvium_dem::preparation::Rest;
 use colluvium_dem::*;
 use nalgebra::{UnitQuaternion, Vector3};
 
@@ -213,4 +214,28 @@ fn a_brick_slides_off_a_held_one() {
     println!("slides at {rate} m/s² on a body, exact {exact}");
     assert!((rate / exact - 1.0).abs() < 5e-3, "{rate} {exact}");
     assert!(s.momentum_error() < 1e-12);
+}
+
+#[test]
+fn measures_of_rest_know_bodies() {
+    let mut s = on_floor(brick(), 0.2, 0.5, -9.81 * Vector3::z());
+    s.advance(100).unwrap();
+    let (mass, speed) = (
+        s.body_setup(0).mass_properties("body").unwrap().mass,
+        9.81 * s.time(),
+    );
+    let measures = s.rest_measures(9.81);
+    let Solid::Cuboid { half_sides } = brick().solid else {
+        panic!("a brick is a cuboid")
+    };
+    let expected = 0.5 * mass * speed * speed / (mass * 9.81 * 2.0 * half_sides.norm());
+    assert!(
+        (measures.kinetic / expected - 1.0).abs() < 1e-9,
+        "{measures:?} {expected}"
+    );
+    assert_eq!(measures.unbalanced, f64::INFINITY);
+    let mut s = on_floor(brick(), half_sides.z, 0.5, -9.81 * Vector3::z());
+    s.advance(100_000).unwrap();
+    let measures = s.rest_measures(9.81);
+    assert!(Rest::default().holds(&measures), "{measures:?}");
 }

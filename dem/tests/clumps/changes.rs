@@ -39,7 +39,7 @@ fn a_clump_goes_and_is_fixed_as_a_whole() {
         "{:e}",
         world.momentum_error()
     );
-    world.fix(|grain| grain.id == 5);
+    world.fix(|grain| grain.id == 5).unwrap();
     assert_eq!(world.clump_count(), 0);
     let before = world.grain_list();
     assert_eq!(before.iter().filter(|g| g.fixed).count(), 4);
@@ -96,7 +96,7 @@ fn velocities_that_are_given_and_damped_are_those_of_the_whole() {
 #[test]
 fn what_cannot_be_a_clump_is_refused_and_changes_nothing() {
     let mut world = two();
-    world.fix(|grain| grain.id == 8);
+    world.fix(|grain| grain.id == 8).unwrap();
     let hash = world.state_hash();
     let flat = MassProperties {
         mass: 1.0,
@@ -136,4 +136,69 @@ fn what_cannot_be_a_clump_is_refused_and_changes_nothing() {
     world.remove(|grain| ids.contains(&grain.id));
     assert_eq!(world.state_hash(), hash);
     assert_eq!(world.clump_count(), 2);
+}
+
+#[test]
+fn velocities_that_are_given_as_they_are_change_nothing() {
+    let mut world = two();
+    let spin = v(30.0, -20.0, 40.0);
+    let come = put(
+        &dogleg(),
+        v(0.0, 0.3, 0.3),
+        orientation(3),
+        [v(0.2, 0.1, 0.0), spin],
+    );
+    let numbers: Vec<u32> = world.insert(&come).unwrap().collect();
+    let mass = MassProperties {
+        mass: 0.02,
+        centre: v(0.0, 0.302, 0.301),
+        inertia: nalgebra::Matrix3::from_diagonal(&v(1e-6, 1.2e-6, 1.5e-6)),
+    };
+    world
+        .clump(&[Clump {
+            grains: numbers,
+            mass: Some(mass),
+        }])
+        .unwrap();
+    world.advance(500).unwrap();
+    let before = world.clump_samples();
+    world.give_velocity(|grain| grain.velocity);
+    for (a, b) in before.iter().zip(world.clump_samples()) {
+        assert!((a.velocity - b.velocity).norm() < 1e-14, "{a:?} {b:?}");
+        assert!((a.angular_momentum - b.angular_momentum).norm() < 1e-16);
+    }
+}
+
+#[test]
+fn members_that_overlap_come_into_a_run_without_a_force_between_them() {
+    let mut world = two();
+    world.advance(1000).unwrap();
+    let deepest = world.largest_overlap();
+    let motion = [v(0.3, 0.0, -1.0), v(0.0, 4.0, 2.0)];
+    let come = put(&dogleg(), v(0.0, 0.2, 0.1), orientation(0), motion);
+    let clump = Clump {
+        grains: vec![0, 1, 2],
+        mass: None,
+    };
+    let odd = Clump {
+        grains: vec![0, 3],
+        mass: None,
+    };
+    assert!(world.insert_clumped(&come, &[odd]).is_err());
+    assert_eq!((world.clump_count(), world.grain_count()), (2, 9));
+    let numbers = world.insert_clumped(&come, &[clump]).unwrap();
+    assert_eq!(world.clump_grains()[2], numbers.collect::<Vec<u32>>());
+    assert_eq!(world.largest_overlap(), deepest);
+    let new = world.clump_samples()[2];
+    assert!((new.spin - motion[1]).norm() < 1e-12, "{}", new.spin);
+    let steps = 2000;
+    world.advance(steps).unwrap();
+    assert!(world.largest_overlap() < 0.1, "{}", world.largest_overlap());
+    let now = world.clump_samples()[2];
+    let (t, g) = (steps as f64 * 1e-5, 9.81);
+    let fallen = now.centre.z - new.centre.z;
+    let expected = new.velocity.z * t - 0.5 * g * t * t;
+    assert!((fallen - expected).abs() < 1e-12, "{fallen} {expected}");
+    assert!((now.velocity.x - new.velocity.x).abs() < 1e-13);
+    assert!(world.momentum_error() < 1e-12);
 }

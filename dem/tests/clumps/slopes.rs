@@ -68,7 +68,7 @@ fn bed(balls: Vec<(Vector3<f64>, f64)>) -> Simulation {
 fn speed_on(bed: &Simulation, degrees: f64) -> f64 {
     let mut flow = bed.clone();
     let (s, c) = degrees.to_radians().sin_cos();
-    flow.set_gravity(v(G * s, 0.0, -G * c));
+    flow.set_gravity(v(G * s, 0.0, -G * c)).unwrap();
     flow.give_velocity(|grain| v(2.0 * grain.position.z.max(0.0), 0.0, 0.0));
     flow.advance(37_500).unwrap();
     let moving = flow.clump_samples();

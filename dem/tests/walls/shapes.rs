@@ -1,7 +1,7 @@
 //! Resting shapes.
 
 use super::scene::*;
-use colluvium_dem::walls::{Ends, Frustum};
+use colluvium_dem::walls::{Ends, Frustum, Rotation};
 use colluvium_dem::*;
 use nalgebra::Vector3;
 use std::f64::consts::TAU;
@@ -237,4 +237,76 @@ fn shapes_of_impossible_size_are_refused_by_name() {
     refuse(Wall::sphere(z, f64::NAN, Side::Inside), "walls[0].radius");
     refuse(Wall::plane(z * f64::NAN, z), "walls[0].position");
     refuse(Wall::plane(z, z).material(3), "material 3");
+}
+
+#[test]
+fn walls_that_a_periodic_box_shows_in_part_are_refused() {
+    let (x, z) = (Vector3::x(), Vector3::z());
+    let try_in = |wall: Wall| {
+        let mut setup = setup(smooth(), vec![ball([0.0; 3], [0.0; 3])], vec![wall], 1e-6);
+        setup.domain.lower = Vector3::new(-1.0, -1.0, -9.0);
+        setup.domain.upper = Vector3::new(1.0, 1.0, 9.0);
+        setup.domain.periodic = [true, true, false];
+        Simulation::new(setup)
+            .map(|_| ())
+            .map_err(|error| error.to_string())
+    };
+    let refuse = |wall: Wall, words: &str| {
+        let error = try_in(wall).unwrap_err();
+        assert!(
+            error.contains("walls[0]") && error.contains(words),
+            "{error}"
+        );
+    };
+    let slant = Vector3::new(0.6, 0.0, 0.8);
+    let about = |axis| {
+        Motion::Rotation(Rotation {
+            point: Vector3::zeros(),
+            axis,
+            rate: 1.0,
+        })
+    };
+    refuse(
+        Wall::plane(-z, slant),
+        "normal, its part along the periodic axis x = 0.6",
+    );
+    refuse(Wall::plane(-z, z).moving(about(x)), "periodic axis y = 1");
+    refuse(Wall::disk(-z, z, 1.2), "periodic axis x = 1.2");
+    refuse(Wall::sphere(-z, 1.01, Side::Outside), "at most half");
+    refuse(
+        Wall::cylinder(-z, slant, 0.1, Side::Outside),
+        "periodic axis x",
+    );
+    refuse(Wall::tube(-z, slant, 0.1, 4.0), "periodic axis x");
+    let plate = |u: Vector3<f64>| Wall::rectangle(-z, [u, Vector3::y()]);
+    refuse(plate(1.7 * slant), "periodic axis x = 1.02");
+    refuse(plate(1.2 * x).moving(about(z)), "periodic axis x");
+    let cone = Frustum {
+        axis: x,
+        height: 1.5,
+        radii: [0.2, 0.1],
+        ends: Ends::Capped,
+    };
+    refuse(Wall::frustum(-z, cone), "periodic axis x = 1.5");
+    // What is straight along the axis stands for its images, and what is small is one of them.
+    for wall in [
+        Wall::plane(-z, z).moving(about(z)),
+        Wall::disk(-z, z, 1.0),
+        Wall::cylinder(-z, x, 0.5, Side::Inside),
+        Wall::tube(-z, x, 0.5, 9.0).moving(about(x)),
+        plate(1.7 * x),
+        plate(1.6 * slant),
+        Wall::cuboid(-z, Vector3::new(5.0, 0.5, 0.2)),
+    ] {
+        try_in(wall).unwrap();
+    }
+}
+
+#[test]
+#[should_panic(expected = "index out of bounds")]
+fn a_part_of_a_body_is_no_wall() {
+    let mut setup = setup(smooth(), vec![ball([0.0; 3], [0.0; 3])], vec![], 1e-6);
+    setup.bodies = vec![Body::new(vec![Part::sphere(0.1, 1.0)]).at(Vector3::x())];
+    let world = Simulation::new(setup).unwrap();
+    world.wall_pose(0);
 }

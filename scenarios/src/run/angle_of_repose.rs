@@ -176,12 +176,20 @@ impl AngleOfReposeScene {
     }
 
     /// Sets the bed moving on the slope that is to be tried next.
-    fn begin(&self, search: &mut Search, simulation: &mut Simulation, unit: f64) {
+    fn begin(
+        &self,
+        search: &mut Search,
+        simulation: &mut Simulation,
+        unit: f64,
+    ) -> Result<(), Failure> {
         let rate = self.shear(unit);
-        simulation.set_gravity(self.tilted(search.slope()));
+        simulation
+            .set_gravity(self.tilted(search.slope()))
+            .map_err(|error| Failure::Run(error.to_string()))?;
         simulation.give_velocity(|g| Vector3::new(rate * g.position.z.max(0.0), 0.0, 0.0));
         search.since = simulation.time();
         search.given = simulation.momentum().x / simulation.free_mass();
+        Ok(())
     }
 }
 
@@ -348,7 +356,7 @@ impl Recipe for AngleOfReposeScene {
                     .map(|g| [g.position.x, g.position.y, g.position.z, g.radius])
                     .collect(),
             };
-            self.begin(&mut search, simulation, unit);
+            self.begin(&mut search, simulation, unit)?;
             search.write(state);
             return Ok(Course::On);
         };
@@ -365,7 +373,7 @@ impl Recipe for AngleOfReposeScene {
         let over = search.high - search.low <= self.search.resolution;
         if !over {
             self.lay(&search.bed, simulation)?;
-            self.begin(&mut search, simulation, unit);
+            self.begin(&mut search, simulation, unit)?;
         }
         search.write(state);
         Ok(if over { Course::Over } else { Course::On })

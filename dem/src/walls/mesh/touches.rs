@@ -11,6 +11,10 @@
 //! 2. Touches whose normals differ by less than the crease angle belong to one gently bent surface and make
 //!    one contact ([`super::way_out`]); others are contacts of their own, as in the corner of a box.
 //!
+//! A fine mesh may offer far more than a step has room for. Offers are looked at in rounds, the nearest first: each
+//! leaves out what touches of earlier rounds hide, so that hidden offers take no one's room and the outcome is that
+//! of looking at all of them at once.
+//!
 //! A touch that appears or vanishes does so where its share is zero, as long as overlaps are below 13 % of the
 //! radius (1 − cos of the crease angle): the force is continuous.
 
@@ -33,10 +37,19 @@ const ROUND_OFF: f64 = 1e-9;
 /// A foot, and the number of whose it is.
 pub(crate) type Offer = (Foot, u32);
 
+/// Offers looked at in a round.
+const ROUND: usize = 2 * TOUCHES;
+
 /// Offers of triangles, the nearest first.
 pub(crate) struct Offers {
-    feet: [Offer; 2 * TOUCHES],
+    feet: [Offer; ROUND],
     len: usize,
+    /// Whether some were left for another round.
+    left: bool,
+    /// The last offer of the rounds before, if there were any, and what they found.
+    seen: Option<(f64, u32)>,
+    touches: [Offer; TOUCHES],
+    found: usize,
 }
 
 /// Contacts with a mesh, the nearest first.
@@ -54,50 +67,75 @@ const NOTHING: Offer = (
 );
 
 impl Offers {
-    pub fn none() -> Offers {
+    fn none() -> Offers {
         Offers {
-            feet: [NOTHING; 2 * TOUCHES],
+            feet: [NOTHING; ROUND],
             len: 0,
+            left: false,
+            seen: None,
+            touches: [NOTHING; TOUCHES],
+            found: 0,
         }
     }
 
     /// Takes an offer in, in order of distance and then of number: the order of asking must not matter.
-    pub fn take(&mut self, foot: Foot, number: u32) {
+    pub fn take(&mut self, foot: Foot, number: u32, radius: f64) {
         let before = |(f, n): &Offer| (f.distance, *n) <= (foot.distance, number);
-        let at = self.feet[..self.len].partition_point(before);
-        if at == self.feet.len() {
+        let again = |seen: (f64, u32)| (foot.distance, number) <= seen || self.hides(&foot, radius);
+        if self.seen.is_some_and(again) {
             return;
         }
-        let end = (self.len + 1).min(self.feet.len());
+        let at = self.feet[..self.len].partition_point(before);
+        self.left |= self.len == ROUND;
+        if at == ROUND {
+            return;
+        }
+        let end = (self.len + 1).min(ROUND);
         self.feet.copy_within(at..end - 1, at + 1);
         self.feet[at] = (foot, number);
         self.len = end;
     }
 
-    /// The offers that no nearer one hides.
-    fn touches(&self, radius: f64) -> ([Offer; TOUCHES], usize) {
-        let (mut touches, mut len) = ([NOTHING; TOUCHES], 0);
-        for offer in &self.feet[..self.len] {
-            let foot = &offer.0;
-            let hidden = touches[..len].iter().any(|(nearer, _): &Offer| {
-                let rise = nearer.distance - foot.distance * foot.normal.dot(&nearer.normal);
-                rise <= ROUND_OFF * radius
-            });
-            if !hidden && len < TOUCHES {
-                touches[len] = *offer;
-                len += 1;
-            }
-        }
-        (touches, len)
+    /// Whether a touch hides an offer that is farther.
+    fn hides(&self, foot: &Foot, radius: f64) -> bool {
+        self.touches[..self.found].iter().any(|(nearer, _)| {
+            let rise = nearer.distance - foot.distance * foot.normal.dot(&nearer.normal);
+            rise <= ROUND_OFF * radius
+        })
     }
 
-    /// The contacts of a sphere of this radius with all that was offered.
-    pub fn contacts(&self, radius: f64) -> MeshContacts {
+    /// Adds the offers of a round that no nearer one hides to the touches; whether there may be more.
+    fn look(&mut self, radius: f64) -> bool {
+        for k in 0..self.len {
+            let offer = self.feet[k];
+            if self.found < TOUCHES && !self.hides(&offer.0, radius) {
+                self.touches[self.found] = offer;
+                self.found += 1;
+            }
+            self.seen = Some((offer.0.distance, offer.1));
+        }
+        self.len = 0;
+        std::mem::take(&mut self.left) && self.found < TOUCHES
+    }
+
+    /// The contacts of a sphere of this radius with all that `ask` offers; it is asked once a round.
+    pub fn contacts(radius: f64, mut ask: impl FnMut(&mut Offers)) -> MeshContacts {
+        let mut offers = Offers::none();
+        loop {
+            ask(&mut offers);
+            if !offers.look(radius) {
+                return offers.group(radius);
+            }
+        }
+    }
+
+    /// Puts touches of one surface together.
+    fn group(&self, radius: f64) -> MeshContacts {
         let mut contacts = MeshContacts {
             feet: [NOTHING; CONTACTS],
             len: 0,
         };
-        let (touches, len) = self.touches(radius);
+        let (touches, len) = (&self.touches, self.found);
         let mut taken = [false; TOUCHES];
         for lead in 0..len {
             if taken[lead] || contacts.len == CONTACTS {
@@ -145,14 +183,14 @@ mod tests {
     /// stiffness.
     fn push(mesh: &Mesh, centre: Vector3<f64>) -> Vector3<f64> {
         let radius = 0.1;
-        let mut offers = Offers::none();
-        for (triangle, number) in mesh.triangles().iter().zip(0..) {
-            let foot = triangle.foot(&centre);
-            if foot.distance < radius {
-                offers.take(foot, number);
+        let contacts = Offers::contacts(radius, |offers| {
+            for (triangle, number) in mesh.triangles().iter().zip(0..) {
+                let foot = triangle.foot(&centre);
+                if foot.distance < radius {
+                    offers.take(foot, number, radius);
+                }
             }
-        }
-        let contacts = offers.contacts(radius);
+        });
         let pushes = contacts.feet().iter();
         pushes.map(|(f, _)| f.normal * (radius - f.distance)).sum()
     }
@@ -199,23 +237,67 @@ mod tests {
         assert!((corner - both).norm() < 1e-15, "{corner}");
     }
 
+    /// A floor and a wall at x = 0, in squares of a side, two triangles each.
+    fn right_angle(side: f64, count: u32) -> Mesh {
+        let (mut vertices, mut triangles) = (Vec::new(), Vec::new());
+        for wall in [false, true] {
+            let first = vertices.len() as u32;
+            for (i, j) in (0..=count).flat_map(|i| (0..=count).map(move |j| (i, j))) {
+                let [across, along] = [i, j].map(|k| side * f64::from(k));
+                let along = along - 0.5 * side * f64::from(count);
+                vertices.push(if wall {
+                    Vector3::new(0.0, along, across)
+                } else {
+                    Vector3::new(across, along, 0.0)
+                });
+            }
+            for (i, j) in (0..count).flat_map(|i| (0..count).map(move |j| (i, j))) {
+                let at = |i: u32, j: u32| first + i * (count + 1) + j;
+                triangles.push([at(i, j), at(i + 1, j), at(i, j + 1)]);
+                triangles.push([at(i + 1, j), at(i + 1, j + 1), at(i, j + 1)]);
+            }
+        }
+        Mesh::new(vertices, &triangles).unwrap_or_else(|e| panic!("{e}"))
+    }
+
+    #[test]
+    fn a_fine_mesh_on_the_deeper_wall_of_a_corner_takes_no_room_from_the_other() {
+        let centre = Vector3::new(0.0995, 0.0003, 0.099);
+        for (side, count) in [(0.2, 1), (0.005, 40), (0.0025, 80)] {
+            let mesh = right_angle(side, count);
+            let reached = mesh.triangles().iter().map(|t| t.foot(&centre).distance);
+            let reached = reached.filter(|d| *d < 0.1).count();
+            assert!((reached > ROUND) == (count > 1), "{reached}");
+            let push = push(&mesh, centre);
+            let both = Vector3::new(0.0005, 0.0, 0.001);
+            assert!((push - both).norm() < 1e-15, "{count}: {push}");
+        }
+    }
+
     #[test]
     fn the_order_of_offers_does_not_matter() {
-        let mesh = bent(0.2);
-        let centre = Vector3::new(-0.001, 0.001, 0.09);
-        let feet: Vec<Offer> = mesh
-            .triangles()
-            .iter()
-            .map(|t| t.foot(&centre))
-            .zip(0..)
-            .collect();
-        let contacts = |order: &[usize]| {
-            let mut offers = Offers::none();
-            for &k in order {
-                offers.take(feet[k].0, feet[k].1);
+        let fine = (right_angle(0.005, 40), Vector3::new(0.0995, 0.0003, 0.099));
+        let bent = (bent(0.2), Vector3::new(-0.001, 0.001, 0.09));
+        for (mesh, centre) in [fine, bent] {
+            let feet = mesh.triangles().iter().map(|t| t.foot(&centre));
+            let feet: Vec<Offer> = feet.zip(0..).filter(|(f, _)| f.distance < 0.1).collect();
+            let contacts = |stride: usize| {
+                let contacts = Offers::contacts(0.1, |offers| {
+                    for k in 0..feet.len() {
+                        let (foot, number) = feet[k * stride % feet.len()];
+                        offers.take(foot, number, 0.1);
+                    }
+                });
+                contacts.feet().to_vec()
+            };
+            let coprime = (3..).find(|s| gcd(*s, feet.len()) == 1).unwrap_or(1);
+            for stride in [feet.len() - 1, coprime] {
+                assert_eq!(contacts(1), contacts(stride), "{stride}");
             }
-            offers.contacts(0.1).feet().to_vec()
-        };
-        assert_eq!(contacts(&[0, 1, 2, 3]), contacts(&[3, 1, 0, 2]));
+        }
+    }
+
+    fn gcd(a: usize, b: usize) -> usize {
+        if b == 0 { a } else { gcd(b, a % b) }
     }
 }

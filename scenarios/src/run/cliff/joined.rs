@@ -283,10 +283,10 @@ impl<'a> JoinedCliff<'a> {
             simulation
                 .set_loads(&[])
                 .map_err(|why| Failure::Run(why.to_string()))?;
-            simulation.fix(|_| true);
-        } else {
-            simulation.fix(|g| !all.contains(&g.id));
         }
+        simulation
+            .fix(|g| due.last || !all.contains(&g.id))
+            .map_err(|why| Failure::Run(why.to_string()))?;
         match (&mut standing, due.last) {
             (Some(standing), last) => {
                 standing.admit(&runout, simulation);
