@@ -447,7 +447,7 @@ fn rheology_file(
         i_0_error: Some(fit.i_0_error),
         diameter: body.grains.diameter,
         solid_fraction: fit.solid_fraction,
-        solid_fraction_error: Some(fit.solid_fraction_error),
+        solid_fraction_error: fit.solid_fraction_error,
         solid_fraction_of_i: fit.solid_fraction_of_i,
         grain_density: Some(body.grains.density),
         valid_i: Some(fit.valid_i),

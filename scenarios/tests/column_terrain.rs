@@ -174,7 +174,7 @@ fn front_as_grains(sets: &[&str], [most_apart, most_off]: [f64; 2]) {
         assert!(value(&joined, name) < 1e-10, "{name}");
     }
     assert!(value(&joined, "handshake_mass").abs() < 0.02);
-    assert!(joined["ledger"]["mass_relative"].as_f64().unwrap().abs() < 1e-11);
+    assert!(value(&joined, "ledger_volume").abs() < 1e-11);
     // The front has come down from where the column stood.
     let level = all[0][2];
     let reached = all.iter().filter(|row| row[1] > 0.05).map(|row| row[2]);

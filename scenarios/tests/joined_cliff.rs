@@ -66,7 +66,7 @@ fn a_joined_cliff_falls_as_its_grains_do() {
     assert!(value(joined, "ledger_grains") < 1e-10);
     assert!(value(joined, "ledger_exchange") < 1e-10);
     assert!(value(joined, "handshake_mass").abs() < 0.02);
-    assert!(joined["ledger"]["mass_relative"].as_f64().unwrap().abs() < 1e-12);
+    assert!(value(joined, "ledger_volume").abs() < 1e-12);
     let heap = |name: &str| table(&at(name).join("deposit.csv")).1;
     let apart = |name: &str| {
         let (own, all) = (heap(name), heap("grains"));

@@ -7,7 +7,7 @@ pub use deviation::Deviation;
 pub use joint::{Fraction, JointAlternative, JointComparison, compare_joint_laws};
 
 use super::least_squares::{FitError, levenberg_marquardt};
-use super::mu_i::{Stress, checked_points, run_numbers};
+use super::mu_i::{Stress, between_runs, checked_points, run_numbers};
 use super::points::LocalPoint;
 use nalgebra::{SMatrix, SVector};
 use serde::{Deserialize, Serialize};
@@ -162,21 +162,6 @@ fn weights(criteria: &[f64]) -> Vec<f64> {
     let likelihood = |c: &f64| (-0.5 * (c - best)).exp();
     let sum: f64 = criteria.iter().map(likelihood).sum();
     criteria.iter().map(|c| likelihood(c) / sum).collect()
-}
-
-/// Σ_runs m ē²/(runs − `parameters`) for runs of m points whose normalised residuals have the mean ē; 0 where runs are too few.
-fn between_runs(normalised: &[f64], by_run: &[usize], parameters: usize) -> f64 {
-    let runs = by_run.iter().max().map_or(0, |m| m + 1);
-    if runs <= parameters {
-        return 0.0;
-    }
-    let mut sums = vec![(0.0, 0.0); runs];
-    for (residual, run) in normalised.iter().zip(by_run) {
-        sums[*run].0 += residual;
-        sums[*run].1 += 1.0;
-    }
-    let between: f64 = sums.iter().map(|(sum, n)| sum * sum / n).sum();
-    between / (runs - parameters) as f64
 }
 
 /// All laws that can be fitted, the best supported first.

@@ -27,6 +27,7 @@ pub use least_squares::FitError;
 pub use mu_i::{MuIFit, SolidFractionFit, Stress, fit_mu_i, fit_solid_fraction, mu_of_i};
 pub use points::{LocalPoint, PointRules, flow_height, local_points};
 pub use posterior::{Posterior, sample_posterior};
+pub(crate) use prediction::inertial_number;
 pub use prediction::{BulkFlow, CONTROL, Discrepancy, LeftOut, band, law_of, left_out};
 pub use residual_tests::{ResidualTests, pressure_ratio, residual_tests};
 pub use table::friction_table;

@@ -58,8 +58,8 @@ pub struct MuIFit {
     pub valid_i: [f64; 2],
     /// Mean solid fraction of the points.
     pub solid_fraction: f64,
-    /// Standard error of that mean between runs.
-    pub solid_fraction_error: f64,
+    /// Standard error of that mean between runs; none of a single run.
+    pub solid_fraction_error: Option<f64>,
     /// φ against I.
     pub solid_fraction_of_i: Option<SolidFractionFit>,
     /// Do the data determine all three parameters?
@@ -179,25 +179,15 @@ pub fn fit_mu_i(points: &[LocalPoint], stress: Stress) -> Result<MuIFit, FitErro
         .collect();
     let by_run = run_numbers(points);
     let runs = by_run.iter().max().map_or(0, |m| m + 1);
-    let mut between = 0.0;
-    for run in 0..runs {
-        let own: Vec<f64> = normalised
-            .iter()
-            .zip(&by_run)
-            .filter(|(_, r)| **r == run)
-            .map(|(e, _)| *e)
-            .collect();
-        let mean = own.iter().sum::<f64>() / own.len() as f64;
-        between += own.len() as f64 * mean * mean;
-    }
+    let between = between_runs(&normalised, &by_run, 3);
     let freedom = points.len() - 3;
     let mut scale = (fit.chi_square / freedom as f64).max(1.0);
     let mut scale_freedom = None;
     if runs > 3 {
         let nu = (runs - 3) as f64;
         let student = StudentsT::new(0.0, 1.0, nu).map_or(1.0, |t| t.inverse_cdf(ONE_SIGMA));
-        if between / nu > scale {
-            scale = between / nu * student * student;
+        if between > scale {
+            scale = between * student * student;
             scale_freedom = Some(nu);
         }
     }
@@ -241,7 +231,7 @@ pub fn fit_mu_i(points: &[LocalPoint], stress: Stress) -> Result<MuIFit, FitErro
 }
 
 /// Friction of a point and its standard error.
-fn friction(stress: Stress, p: &LocalPoint) -> (f64, f64) {
+pub(super) fn friction(stress: Stress, p: &LocalPoint) -> (f64, f64) {
     match stress {
         Stress::MeanPressure => (p.friction, p.friction_error),
         Stress::NormalPressure => (p.friction_zz, p.friction_zz_error),
@@ -327,20 +317,35 @@ pub(super) fn checked_points(
     }
 }
 
-/// Numbers the runs: a run is a stretch of points of one slope, from below.
+/// Numbers the runs: a run is a stretch of points of one slope that rise; no run has two at one height.
 pub(super) fn run_numbers(points: &[LocalPoint]) -> Vec<usize> {
     let mut run = 0;
     let mut numbers = Vec::with_capacity(points.len());
     for (k, p) in points.iter().enumerate() {
         let before = k.checked_sub(1).map(|k| &points[k]);
-        let another = |b: &LocalPoint| b.slope_degrees != p.slope_degrees || b.z > p.z;
+        let another = |b: &LocalPoint| b.slope_degrees != p.slope_degrees || b.z >= p.z;
         run += usize::from(before.is_some_and(another));
         numbers.push(run);
     }
     numbers
 }
 
-fn mean_between_runs(points: &[LocalPoint], by_run: &[usize], runs: usize) -> (f64, f64) {
+/// Σ_runs m ē²/(runs − `parameters`) for runs of m points whose normalised residuals have the mean ē; 0 where runs are too few.
+pub(super) fn between_runs(normalised: &[f64], by_run: &[usize], parameters: usize) -> f64 {
+    let runs = by_run.iter().max().map_or(0, |m| m + 1);
+    if runs <= parameters {
+        return 0.0;
+    }
+    let mut sums = vec![(0.0, 0.0); runs];
+    for (residual, run) in normalised.iter().zip(by_run) {
+        sums[*run].0 += residual;
+        sums[*run].1 += 1.0;
+    }
+    let between: f64 = sums.iter().map(|(sum, n)| sum * sum / n).sum();
+    between / (runs - parameters) as f64
+}
+
+fn mean_between_runs(points: &[LocalPoint], by_run: &[usize], runs: usize) -> (f64, Option<f64>) {
     let mean = points.iter().map(|p| p.solid_fraction).sum::<f64>() / points.len() as f64;
     let mut squares = 0.0;
     for run in 0..runs {
@@ -354,14 +359,8 @@ fn mean_between_runs(points: &[LocalPoint], by_run: &[usize], runs: usize) -> (f
         squares += (own_mean - mean).powi(2);
     }
     let r = runs as f64;
-    (
-        mean,
-        if runs > 1 {
-            (squares / (r * (r - 1.0))).sqrt()
-        } else {
-            0.0
-        },
-    )
+    let error = (runs > 1).then(|| (squares / (r * (r - 1.0))).sqrt());
+    (mean, error)
 }
 
 /// Least error of φ: slices of a dense bed fluctuate so little that counting errors alone would weigh absurdly.

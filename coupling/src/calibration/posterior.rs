@@ -14,7 +14,7 @@
 
 mod valley;
 
-use super::mu_i::{MuIFit, ONE_SIGMA, Stress, mu_of_i};
+use super::mu_i::{MuIFit, ONE_SIGMA, friction, mu_of_i};
 use super::points::LocalPoint;
 use crate::steady_state::autocorrelation_time;
 use nalgebra::Vector3;
@@ -64,11 +64,6 @@ pub fn sample_posterior(points: &[LocalPoint], fit: &MuIFit, seed: u64) -> Optio
     if !fit.physical || points.is_empty() {
         return None;
     }
-    let friction = |p: &LocalPoint| match fit.stress {
-        Stress::MeanPressure => (p.friction, p.friction_error),
-        Stress::NormalPressure => (p.friction_zz, p.friction_zz_error),
-        Stress::TangentOfSlope => (p.slope_degrees.to_radians().tan(), p.friction_zz_error),
-    };
     let student = fit.scale_freedom.and_then(|nu| {
         Some((
             nu,
@@ -87,7 +82,7 @@ pub fn sample_posterior(points: &[LocalPoint], fit: &MuIFit, seed: u64) -> Optio
         }
         let mut sum = 0.0;
         for p in points {
-            let (mu, error) = friction(p);
+            let (mu, error) = friction(fit.stress, p);
             let i = p.inertial_number;
             let lever = (mu_2 - mu_s) * i_0 / ((i + i_0) * (i + i_0)) * p.inertial_number_error;
             let variance = error * error + lever * lever;
@@ -99,7 +94,7 @@ pub fn sample_posterior(points: &[LocalPoint], fit: &MuIFit, seed: u64) -> Optio
     let data: Vec<[f64; 4]> = points
         .iter()
         .map(|p| {
-            let (mu, error) = friction(p);
+            let (mu, error) = friction(fit.stress, p);
             [p.inertial_number, mu, error, p.inertial_number_error]
         })
         .collect();
@@ -152,8 +147,16 @@ pub fn sample_posterior(points: &[LocalPoint], fit: &MuIFit, seed: u64) -> Optio
 /// Probabilities of the quantiles told.
 const QUANTILES: [f64; 5] = [0.025, 0.16, 0.5, 0.84, 0.975];
 
+/// A quantile of all samples: what overflows is the largest number there is, so that it counts; one that is not a number counts
+/// as no value of what is asked for, and there is no quantile.
 fn quantile<T>(samples: &[T], of: impl Fn(&T) -> f64, probability: f64) -> f64 {
-    let mut values: Vec<f64> = samples.iter().map(of).filter(|x| x.is_finite()).collect();
+    let mut values: Vec<f64> = samples.iter().map(of).collect();
+    if values.iter().any(|x| x.is_nan()) {
+        return f64::NAN;
+    }
+    for value in &mut values {
+        *value = value.clamp(f64::MIN, f64::MAX);
+    }
     values.sort_by(f64::total_cmp);
     let last = values.len().saturating_sub(1);
     values

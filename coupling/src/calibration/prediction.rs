@@ -52,7 +52,7 @@ fn index(stress: Stress) -> usize {
 }
 
 /// I at which the law has this friction: 0 up to μ_s, infinite from μ_2 on.
-pub(super) fn inertial_number([mu_s, mu_2, i_0]: [f64; 3], mu: f64) -> f64 {
+pub(crate) fn inertial_number([mu_s, mu_2, i_0]: [f64; 3], mu: f64) -> f64 {
     if mu <= mu_s {
         0.0
     } else if mu >= mu_2 {

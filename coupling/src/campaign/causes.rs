@@ -2,8 +2,8 @@
 
 use super::verdict::{Evidence, LARGEST_MISFIT};
 use crate::calibration::{
-    Alternative, Fraction, JointComparison, Law, LocalPoint, MuIFit, Posterior, mu_of_i,
-    pressure_ratio,
+    Alternative, Fraction, JointComparison, Law, LocalPoint, MuIFit, Posterior, inertial_number,
+    mu_of_i, pressure_ratio,
 };
 
 /// Where the error of the law matters to a continuum: in an inclined flow u ∝ I, and I follows from μ(I) = tan θ.
@@ -14,14 +14,7 @@ pub(super) fn inherited(fit: &MuIFit, posterior: &Option<Posterior>, text: &mut 
     if !fit.physical || rise <= 0.0 {
         return;
     }
-    let at = |[mu_s, mu_2, i_0]: [f64; 3]| {
-        let flows = mu > mu_s && mu < mu_2;
-        if flows {
-            i_0 * (mu - mu_s) / (mu_2 - mu)
-        } else {
-            f64::NAN
-        }
-    };
+    let at = |law: [f64; 3]| inertial_number(law, mu);
     let misfit = fit.rms_residual / rise / i;
     let from_fit = posterior.as_ref().and_then(|p| p.band(at)).map(|b| {
         format!(

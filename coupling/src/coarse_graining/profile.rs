@@ -1,7 +1,7 @@
 //! From sums to fields with standard errors.
 
 use super::{Layering, sums::field};
-use serde::{Deserialize, Serialize};
+use serde::{Deserialize, Deserializer, Serialize};
 
 /// A mean and its standard error.
 ///
@@ -13,8 +13,14 @@ use serde::{Deserialize, Serialize};
 pub struct Estimate {
     /// The mean.
     pub value: f64,
-    /// Its standard error; 0 if there were fewer than 3 blocks.
+    /// Its standard error; not a number if there were fewer than 3 blocks, or one in which the mean is not defined.
+    #[serde(deserialize_with = "number_or_none")]
     pub error: f64,
+}
+
+/// What is not a number is written as none.
+fn number_or_none<'de, D: Deserializer<'de>>(from: D) -> Result<f64, D::Error> {
+    Option::deserialize(from).map(|number| number.unwrap_or(f64::NAN))
 }
 
 /// One layer of a profile. Pressures are positive in compression, stresses positive in tension.
@@ -258,8 +264,8 @@ impl Profile {
                 }
                 // A layer that is empty in some blocks has no error bar worth the name.
                 let defined = values.iter().all(|v| v.is_finite());
-                let error = if values.is_empty() || !defined {
-                    0.0
+                let error = if values.is_empty() {
+                    f64::NAN
                 } else {
                     jackknife_error(&values)
                 };
@@ -275,7 +281,7 @@ impl Profile {
                     } else {
                         0.0
                     },
-                    error: 0.0,
+                    error: f64::NAN,
                 })
             };
             let mut all = |which: usize| plain(get(which), which);
@@ -380,7 +386,8 @@ impl BalanceCheck {
 
 #[cfg(test)]
 mod tests {
-    use super::jackknife_error;
+    use super::{jackknife_error, number_or_none};
+    use serde::de::IntoDeserializer;
 
     /// Estimates without one block each, of a mean over blocks.
     fn without(blocks: &[f64]) -> Vec<f64> {
@@ -402,5 +409,11 @@ mod tests {
         let slow: Vec<f64> = (0..n).map(|k| (0.2 * k as f64).sin()).collect();
         assert!(jackknife_error(&without(&slow)) > 2.0 * plain(&slow));
         assert_eq!(jackknife_error(&without(&[3.0; 40])), 0.0);
+    }
+
+    #[test]
+    fn an_error_that_is_not_known_comes_back_as_such() {
+        let read: Result<f64, serde::de::value::Error> = number_or_none(().into_deserializer());
+        assert!(read.unwrap().is_nan());
     }
 }

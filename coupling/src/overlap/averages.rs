@@ -1,6 +1,7 @@
 //! What the continuum gets to know of the grains: stresses on its faces, mean velocities and spins at its nodes.
 
 use super::edge::ZoneEdge;
+use super::joint::{inertia, over};
 use super::settings::StressKernel;
 use super::strip::{Shares, Strip, interpolate};
 use crate::coarse_graining::{Kernel, Layers, Lucy};
@@ -42,10 +43,6 @@ impl Node {
     pub fn mean_spin(&self) -> f64 {
         over(self.spin, self.inertia)
     }
-}
-
-fn over(sum: f64, weight: f64) -> f64 {
-    if weight > 0.0 { sum / weight } else { 0.0 }
 }
 
 /// Stress of the grains on a face with outward normal n (Pa).
@@ -128,7 +125,7 @@ impl Averages {
             );
             let velocity = grain.velocity.dot(&t);
             let continuum = interpolate(sight.continuum, strip.node(0), strip.cell, s);
-            let inertia = 0.4 * grain.mass * grain.radius * grain.radius;
+            let inertia = inertia(grain);
             let spin = grain.spin.dot(&n.cross(&t));
             for (k, h) in shares {
                 let node = &mut self.nodes[k];

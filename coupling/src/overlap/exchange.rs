@@ -3,6 +3,7 @@
 use super::angular::AngularBook;
 use super::averages::Sight;
 use super::edge::ZoneEdge;
+use super::joint::towards;
 use super::settings::NormalMotion;
 use super::shell::Given;
 use super::strip::Strip;
@@ -102,7 +103,6 @@ impl<L: ShearLaw + Copy> Overlap<L> {
         self.sample(0.0);
         self.agree(simulation);
         let area = self.edge.area();
-        let relaxation: f64 = self.given.relaxation.iter().sum();
         let (edge, cell) = (&self.edge, self.strip.cell);
         let grains = self.sighting.snapshot.grains.iter();
         let escaped = grains.filter(|g| !g.fixed && edge.distance(&g.position) > cell);
@@ -110,7 +110,7 @@ impl<L: ShearLaw + Copy> Overlap<L> {
             &self.averages,
             &self.continuum,
             (&self.strip, area),
-            [relaxation, self.given.shear],
+            (&self.given.relaxation, self.given.shear),
             escaped.count(),
         );
         self.given.clear();
@@ -201,10 +201,9 @@ impl<L: ShearLaw + Copy> Overlap<L> {
         let edge_face = self.strip.nodes();
         self.held.shear = self.continuum.shear_stress(edge_face);
         self.held.pressure = self.continuum.pressure(edge_face);
-        let towards = |time: f64| (dt / time).min(1.0) / dt;
         let (rate, turn) = (
-            towards(self.settings.relaxation_time),
-            towards(self.settings.spin_time),
+            towards(dt, self.settings.relaxation_time),
+            towards(dt, self.settings.spin_time),
         );
         let velocities = self.continuum.velocities();
         for k in self.strip.inner..self.strip.nodes() {

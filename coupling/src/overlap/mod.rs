@@ -31,6 +31,7 @@ mod exchange;
 mod far_side;
 pub mod force_blending;
 pub mod joined_incline;
+mod joint;
 mod ledger;
 pub mod material_edge;
 mod monitors;
@@ -215,10 +216,8 @@ impl<L: ShearLaw + Copy> Overlap<L> {
             sighting,
         } = start;
         let nodes = strip.nodes();
-        let of_loads = (settings.load_time / simulation.timestep())
-            .round()
-            .max(1.0);
-        let loads = (settings.exchange_time / (of_loads * simulation.timestep())).round();
+        let of_loads = settings.steps_of_loads(simulation.timestep());
+        let loads = settings.loads_of_exchange(simulation.timestep());
         Self {
             averages: Averages::new(&strip, settings.kernel),
             settings,
@@ -234,8 +233,8 @@ impl<L: ShearLaw + Copy> Overlap<L> {
             given: Given::nothing(nodes),
             monitors: Monitors::default(),
             ledger: Ledger::default(),
-            steps: (of_loads * loads.max(1.0)) as u64,
-            steps_of_loads: of_loads as u64,
+            steps: of_loads * loads,
+            steps_of_loads: of_loads,
             made: 0,
             normal_velocity: 0.0,
             mass_beyond,

@@ -25,8 +25,8 @@ pub struct Monitors {
 /// What the monitors say.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Report {
-    /// Velocity of the continuum minus that of the grains at the handshake surface m, over that of the grains.
-    /// To be below 1 %.
+    /// Size of the continuum's velocity less that of the grains in the layers beside the handshake surface m, mean in time, over that of
+    /// the grains' velocity; not a number where grains at rest are slipped past. To be below 1 %.
     pub slip: f64,
     /// Shear stress of the grains over that of the continuum at m; none where the continuum has none there but for
     /// round-off, as beside grains that do not act on it. To be within 5 %.
@@ -43,7 +43,8 @@ pub struct Report {
     pub buffer_temperature: f64,
     /// Most grains beyond the edge by more than a cell at any exchange.
     pub escaped: f64,
-    /// Impulse of relaxation over that of the shear traction on the edge. To be below 10 %.
+    /// Σ |impulse| of the relaxation, layer by layer and exchange by exchange, over that of the shear traction on the edge; not a number
+    /// where there is no traction but a relaxation. To be below 10 %.
     pub relaxation_share: f64,
 }
 
@@ -63,14 +64,15 @@ impl Monitors {
         averages: &Averages,
         continuum: &FarSide<L>,
         (strip, area): (&Strip, f64),
-        [relaxation, interface]: [f64; 2],
+        (relaxation, interface): (&[f64], f64),
         escaped: usize,
     ) {
         self.count += 1.0;
         let m = strip.inner;
         let beside = [&averages.nodes[m - 1], &averages.nodes[m]];
-        self.slip += 0.5 * (beside[0].slip() + beside[1].slip());
-        self.velocity += 0.5 * (beside[0].velocity() + beside[1].velocity());
+        // What has two signs must not cancel.
+        self.slip += 0.5 * (beside[0].slip().abs() + beside[1].slip().abs());
+        self.velocity += 0.5 * (beside[0].velocity().abs() + beside[1].velocity().abs());
         let face = &averages.faces[m];
         let pairs = [
             (&mut self.shear, face.shear, continuum.shear_stress(m)),
@@ -92,13 +94,18 @@ impl Monitors {
             }
         }
         self.escaped = self.escaped.max(escaped as f64);
-        self.relaxation += relaxation;
-        self.interface += interface;
+        self.relaxation += relaxation.iter().map(|impulse| impulse.abs()).sum::<f64>();
+        self.interface += interface.abs();
     }
 
     /// Means so far.
     pub fn report(&self) -> Report {
-        let ratio = |a: f64, b: f64| if b == 0.0 { 0.0 } else { a / b };
+        // Nothing over nothing is nothing, and something over nothing is no share.
+        let ratio = |a: f64, b: f64| match a == 0.0 {
+            true => 0.0,
+            false if b == 0.0 => f64::NAN,
+            false => a / b,
+        };
         let mean = |sum: f64| ratio(sum, self.count);
         Report {
             slip: ratio(self.slip, self.velocity),
@@ -109,7 +116,7 @@ impl Monitors {
             inner_temperature: mean(self.temperature[0]),
             buffer_temperature: mean(self.temperature[1]),
             escaped: self.escaped,
-            relaxation_share: ratio(self.relaxation.abs(), self.interface.abs()),
+            relaxation_share: ratio(self.relaxation, self.interface),
         }
     }
 
@@ -166,6 +173,20 @@ impl Monitors {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn a_share_of_nothing_is_not_small() {
+        let share = |relaxation, interface| {
+            let monitors = Monitors {
+                relaxation,
+                interface,
+                ..Monitors::default()
+            };
+            monitors.report().relaxation_share
+        };
+        assert_eq!([share(0.0, 0.0), share(1.0, 4.0)], [0.0, 0.25]);
+        assert!(share(1.0, 0.0).is_nan());
+    }
 
     #[test]
     fn a_stress_of_round_off_has_no_ratio() {

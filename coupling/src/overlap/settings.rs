@@ -43,9 +43,9 @@ pub struct OverlapSettings {
     pub inner: Option<f64>,
     /// Width of the buffer [m, b], where mean velocities relax (m). 3 d.
     pub buffer: Option<f64>,
-    /// Width of the shell that bears the continuum's traction (m), at most `buffer` less a cell. 2 d.
+    /// Width of the shell that bears the continuum's traction (m), at most `buffer`, at a flat edge less a cell. 2 d.
     pub shell: Option<f64>,
-    /// Smoothing of stresses.
+    /// Smoothing of stresses at a flat edge; half-width at most `buffer` less `shell` and half a cell more.
     pub kernel: StressKernel,
     /// Time over which stresses of grains are averaged, exponentially (s). 0.5 √(d/g).
     pub stress_time: Option<f64>,
@@ -136,6 +136,40 @@ impl Resolved {
     pub fn stopping_time(&self, density: f64) -> f64 {
         0.75 * density * self.shell / self.impedance
     }
+
+    /// Steps of the grains for which loads are held, for a time step (s).
+    pub fn steps_of_loads(&self, timestep: f64) -> u64 {
+        (self.load_time / timestep).round().max(1.0) as u64
+    }
+
+    /// Loads until an exchange, for a time step (s).
+    pub(super) fn loads_of_exchange(&self, timestep: f64) -> u64 {
+        let load_time = self.steps_of_loads(timestep) as f64 * timestep;
+        (self.exchange_time / load_time).round().max(1.0) as u64
+    }
+
+    /// Whether what acts on the shell of a flat edge stays out of the stresses that the continuum is given there: they are means over
+    /// a cell about faces, of which the last lies a cell within m, widened by the kernel; the shell begins `buffer` − `shell`
+    /// beyond m.
+    pub(super) fn check_layers(&self) -> Result<(), OverlapError> {
+        let room = self.buffer - self.shell;
+        let slack = 1e-9 * self.cell;
+        check(
+            "shell",
+            self.shell,
+            room >= self.cell - slack,
+            "at most the buffer's width less a cell",
+        )?;
+        match self.kernel {
+            StressKernel::Layer => Ok(()),
+            StressKernel::Lucy(half_width) => check(
+                "kernel.lucy",
+                half_width,
+                half_width <= room + 0.5 * self.cell + slack,
+                "at most the buffer's width less the shell's and half a cell more, for no force on the shell to reach the stresses",
+            ),
+        }
+    }
 }
 
 impl OverlapSettings {
@@ -203,7 +237,6 @@ impl OverlapSettings {
             r.impedance >= 0.0,
             "at least 0 Pa s/m",
         )?;
-        // A force from outside must not reach the stresses that the continuum is given.
         check(
             "shell",
             r.shell,

@@ -15,6 +15,7 @@
 
 use super::angular::{AngularBook, Counterpart, Parts};
 use super::edge::ZoneEdge;
+use super::joint::inertia;
 use super::strip::Strip;
 use colluvium_dem::{GrainSample, Load, SetupError, Simulation};
 use nalgebra::Vector3;
@@ -209,7 +210,7 @@ impl Shell {
             let (n, t) = (near.normal, edge.tangent(&grain.position));
             let share = near.weight * per_weight;
             let (mut rate, mut turn) = (0.0, 0.0);
-            let inertia = 0.4 * grain.mass * grain.radius * grain.radius;
+            let inertia = inertia(grain);
             for (k, h) in strip.shares(near.s) {
                 let acceleration = h * held.accelerations[k];
                 let spin = h * held.spins[k];

@@ -110,8 +110,11 @@ impl<L: ShearLaw + Copy> Start<L> {
 }
 
 impl<L> OverlapSpec<L> {
-    fn resolved(&self) -> Result<Resolved, OverlapError> {
+    /// The settings with nothing left out.
+    pub(super) fn resolved(&self) -> Result<Resolved, OverlapError> {
         let free = sets_pressure(&self.far_end);
-        self.settings.resolve(&self.scales, free)
+        let settings = self.settings.resolve(&self.scales, free)?;
+        settings.check_layers()?;
+        Ok(settings)
     }
 }

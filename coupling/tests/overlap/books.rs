@@ -223,6 +223,21 @@ fn settings_out_of_range_are_refused_by_name() {
                 ..base
             },
         ),
+        // Forces on the shell would reach the stresses of the grains.
+        (
+            "kernel.lucy",
+            OverlapSettings {
+                kernel: StressKernel::Lucy(1.6),
+                ..base
+            },
+        ),
+        (
+            "shell",
+            OverlapSettings {
+                shell: Some(2.1),
+                ..base
+            },
+        ),
     ];
     for (key, settings) in cases {
         let error = refused(settings, 10.0).to_string();

@@ -181,7 +181,11 @@ impl Bed {
 
     /// Goes on for a time, keeping so much of the velocities at every exchange.
     pub(super) fn advance(&mut self, time: f64, keep: f64) {
-        let each = Bowl::steps_of_loads(&self.bowl.spec().settings, self.simulation.timestep());
+        let each = self
+            .bowl
+            .spec()
+            .settings
+            .steps_of_loads(self.simulation.timestep());
         let all = (time / self.simulation.timestep()).round() as u64;
         for _ in 0..all / each {
             for _ in 0..each {
@@ -613,7 +617,7 @@ fn loose_and_warm_grains_move_the_box() {
             _ => Simulation::new(setup(grains)).unwrap(),
         };
         let mut bowl = Bowl::cut(spec, &mut simulation).unwrap();
-        let each = Bowl::steps_of_loads(&bowl.spec().settings, simulation.timestep());
+        let each = bowl.spec().settings.steps_of_loads(simulation.timestep());
         let mut exchanges = 0;
         while bowl.moves().is_empty() && exchanges < 2 {
             for _ in 0..each {

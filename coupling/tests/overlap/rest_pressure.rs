@@ -12,7 +12,7 @@ fn after(rest_strain: f64, time: f64) -> [f64; 2] {
     let mut spec = spec(&mut simulation, TRAVEL, f64::INFINITY);
     spec.settings.rest_strain = rest_strain;
     let mut bowl = Bowl::cut(spec, &mut simulation).unwrap();
-    let each = Bowl::steps_of_loads(&bowl.spec().settings, simulation.timestep());
+    let each = bowl.spec().settings.steps_of_loads(simulation.timestep());
     for _ in 0..(time / simulation.timestep()).round() as u64 / each {
         simulation.advance(each).unwrap();
         bowl.go_on(&mut simulation).unwrap();

@@ -46,7 +46,8 @@ pub(super) fn summarise(scene: &Scene, record: &Campaign) -> Summary {
         }
         summary.put(
             "solid_fraction",
-            Quantity::new(fit.solid_fraction, "1").with_error(fit.solid_fraction_error),
+            Quantity::new(fit.solid_fraction, "1")
+                .with_error(fit.solid_fraction_error.unwrap_or(f64::NAN)),
         );
         summary.put("valid_i_low", Quantity::new(fit.valid_i[0], "1"));
         summary.put("valid_i_high", Quantity::new(fit.valid_i[1], "1"));

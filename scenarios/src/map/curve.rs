@@ -29,7 +29,7 @@ pub(super) fn measured(
             curve: Curve::of(fit, INERTIAL_NUMBERS),
             solid_fraction: WithError {
                 value: fit.solid_fraction,
-                error: fit.solid_fraction_error,
+                error: fit.solid_fraction_error?,
             },
             valid_i: fit.valid_i,
         }),

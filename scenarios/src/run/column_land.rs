@@ -45,8 +45,8 @@ impl CollapseScene {
         );
         let land = Land::new(&ground.profile, end, self.height, (at, key))?;
         let lip = self.lip();
-        if land.level_up_to() < lip {
-            let value = format!("level up to x = {} m", land.level_up_to());
+        if land.level_up_to(self.spacing()) < lip {
+            let value = format!("level up to x = {} m", land.level_up_to(self.spacing()));
             let range = format!("level under the column, up to {lip:.6} m at least");
             return Err(at.refuse(key, value, range).into());
         }
@@ -76,7 +76,7 @@ impl CollapseScene {
         let land = self.land("").ok().flatten();
         let shape = land.map_or(String::new(), |land| {
             let [low, high] = Land::span(Some(&land));
-            let level = match land.level_up_to() {
+            let level = match land.level_up_to(self.spacing()) {
                 end if end < self.length() => format!("level up to x = {end:.4} m"),
                 _ => "level".to_owned(),
             };

@@ -308,7 +308,7 @@ impl Recipe for CollapseScene {
         if let Some(land) = land {
             // A floor that rises above the column's top.
             kept.push(Region::Block {
-                lower: Vector3::new(land.level_up_to(), -endless, -endless),
+                lower: Vector3::new(land.level_up_to(self.spacing()), -endless, -endless),
                 upper: Vector3::repeat(endless),
             });
         }

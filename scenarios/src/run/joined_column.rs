@@ -350,7 +350,10 @@ impl<'a> JoinedColumn<'a> {
                 let filled = x.iter().zip(&h).filter(|(_, h)| **h > least);
                 filled.fold(most, |most, (x, _)| most.max(*x))
             });
-        let (level, keys) = (land.level_up_to(), "zones.edge_scaled, zones.tolerance");
+        let (level, keys) = (
+            land.level_up_to(self.scene.spacing()),
+            "zones.edge_scaled, zones.tolerance",
+        );
         if reached + least > level {
             return Err(off_level_ground(reached, level, "begin", keys));
         }
@@ -443,7 +446,7 @@ impl Recipe for JoinedColumn<'_> {
 
     fn steer_every(&self, timestep: f64) -> u64 {
         let settings = self.scene.overlap_settings(&self.origin);
-        settings.map_or(u64::MAX, |s| MaterialEdge::steps_of_loads(&s, timestep))
+        settings.map_or(u64::MAX, |s| s.steps_of_loads(timestep))
     }
 
     fn steer(&self, simulation: &mut Simulation, state: &mut Vec<f64>) -> Result<Course, Failure> {

@@ -4,6 +4,7 @@ use crate::failure::Failure;
 use crate::scene::world::Place;
 use crate::table::Table;
 use colluvium_continuum::terrain::Profile;
+use colluvium_coupling::overlap::material_edge::LEVEL;
 use colluvium_dem::Wall;
 use colluvium_dem::walls::{Mesh, MeshError};
 use nalgebra::Vector3;
@@ -71,10 +72,12 @@ impl Land {
         })
     }
 
-    /// Where it is no longer level (m).
-    pub fn level_up_to(&self) -> f64 {
+    /// Where it is no longer level (m), seen on cells so long (m): by [`LEVEL`] as a joint's continuum has it.
+    pub fn level_up_to(&self, cell: f64) -> f64 {
         let points = self.line.points();
-        let pair = points.windows(2).find(|pair| pair[1][1] != 0.0);
+        let pair = points
+            .windows(2)
+            .find(|pair| pair[1][1].abs() > LEVEL * cell);
         pair.map_or(f64::INFINITY, |pair| pair[0][0])
     }
 
@@ -148,12 +151,15 @@ mod tests {
         ] {
             assert_eq!(Land::height(Some(&step), x), z, "{x}");
         }
-        assert_eq!(step.level_up_to(), 6.0);
+        assert_eq!(step.level_up_to(0.1), 6.0);
+        // Round-off is no slope.
+        let rounded = land(&[[0.0, 0.0], [3.0, 1e-12], [6.0, 0.0], [12.0, -3.0]]).unwrap();
+        assert_eq!(rounded.level_up_to(0.1), 6.0);
         assert_eq!(Land::span(Some(&step)), [-3.0, 0.0]);
         let slope = land(&[[-2.0, 3.0], [2.0, 1.0], [10.0, 5.0]]).unwrap();
         assert_eq!(Land::height(Some(&slope), 2.0), -1.0);
         assert_eq!(Land::height(Some(&slope), 10.0), 3.0);
-        assert_eq!(slope.level_up_to(), 0.0);
+        assert_eq!(slope.level_up_to(0.1), 0.0);
         assert_eq!(Land::height(None, 3.0), 0.0);
     }
 

@@ -66,7 +66,7 @@ pub struct ColumnZoneKeys {
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("exclusiveMinimum" = 0.0, "maximum" = 100.0))]
     pub tolerance: Option<f64>,
-    /// Most grains, with zones.tolerance or zones.moving. Where the oracle needs more, the tolerance is raised, and the
+    /// Most grains that are free (those of a rough floor do not count), with zones.tolerance or zones.moving. Where the oracle needs more, the tolerance is raised, and the
     /// plan says so; an edge that moves does not move where that would make more.
     #[serde(default, skip_serializing_if = "Option::is_none")]
     #[schemars(extend("minimum" = 1, "maximum" = 1.0e9))]
@@ -430,7 +430,12 @@ impl CollapseScene {
             self.check_intervals(origin)?;
             return self.check_rest(least, origin);
         }
-        if zones.tolerance.is_some() {
+        if let Some(tolerance) = zones.tolerance {
+            // The oracle's run of the continuum alone is of an upright column on level ground.
+            if self.terrain.is_some() || self.overhang_degrees != 0.0 {
+                let range = "left out with [terrain] or an overhang: the oracle follows an upright column on level ground; give zones.edge_scaled or zones.x";
+                return Err(at("zones").refuse("tolerance", tolerance, range));
+            }
             return match zones.rest_scaled {
                 None => Ok(()),
                 Some(rest) => {

@@ -19,10 +19,10 @@
 //! number of points over ĉ, at least the number of flows.
 
 use super::deviation::{Deviation, shares};
-use super::{Law, between_runs, criterion, fit_law, weights};
+use super::{Law, criterion, fit_law, weights};
 use crate::calibration::least_squares::{FitError, levenberg_marquardt, minimise};
 use crate::calibration::mu_i::{
-    LEAST_FRACTION_ERROR, Stress, checked_points, run_numbers, slope, solve,
+    LEAST_FRACTION_ERROR, Stress, between_runs, checked_points, run_numbers, slope, solve,
 };
 use crate::calibration::points::LocalPoint;
 use nalgebra::{DMatrix, DVector, SVector};

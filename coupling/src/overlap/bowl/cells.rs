@@ -8,6 +8,7 @@
 //! l from the centre of the grain that f acts on to that of its partner, h_c at the middle of it, V the volume of a
 //! cell.
 
+use crate::overlap::joint::vector_over as over;
 use colluvium_dem::{GrainSample, Partner, Snapshot};
 use nalgebra::{Matrix3, Vector3};
 
@@ -111,11 +112,6 @@ impl Cover {
     pub fn velocity(&self) -> Vector3<f64> {
         over(self.momentum, self.mass)
     }
-}
-
-/// A quotient, zero where there is nothing to divide by.
-pub fn over(sum: Vector3<f64>, by: f64) -> Vector3<f64> {
-    if by > 0.0 { sum / by } else { Vector3::zeros() }
 }
 
 /// What cells know of the grains.

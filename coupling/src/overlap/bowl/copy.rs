@@ -9,8 +9,8 @@
 //! and its velocity follows theirs, u += (1 − e^{−Δt/t_f}) (v̄ − u), at once on faces beside no full cell. The volume
 //! that this adds is booked.
 
-use super::cells::over;
 use super::{Bowl, OverlapError};
+use crate::overlap::joint::vector_over as over;
 
 /// Cells with less than this part of a full cell's mass in grains have no velocity to follow.
 const LEAST: f64 = 0.05;

@@ -1,19 +1,12 @@
 //! The steps: grains under what is held, and the exchange that follows so many of them.
 
-use super::cells::over;
 use super::continuum::{components, sideways};
 use super::gradients::{gradient, rotation};
 use super::{Bowl, OverlapError};
 use crate::overlap::angular::{AngularBook, Counterpart, Parts};
+use crate::overlap::joint::{self, LEAST_BUFFER, inertia, towards, vector_over as over};
 use colluvium_dem::{GrainSample, Load, Simulation};
 use nalgebra::Vector3;
-
-/// Parts of a full cell's mass at which grains begin to cover a surface, and cover it all.
-const COVERS: [f64; 2] = [0.4, 0.7];
-/// Cells with less of the mass of a full one are not spoken for by their grains.
-const LEAST_COVER: f64 = 0.3;
-/// Part of a full cell's mass from which on the mean velocity of its buffer is one.
-const LEAST_BUFFER: f64 = 0.1;
 
 /// The shell's weight at a face of the box, and its slip.
 #[derive(Clone, Copy, Debug, Default)]
@@ -34,11 +27,6 @@ pub struct Scratch {
     near: Vec<GrainSample>,
     pub(super) shell: Vec<Shell>,
     loads: Vec<Load>,
-}
-
-/// Moment of inertia of a ball (kg m²).
-fn inertia(grain: &GrainSample) -> f64 {
-    0.4 * grain.mass * grain.radius * grain.radius
 }
 
 impl Bowl {
@@ -313,7 +301,7 @@ impl Bowl {
     fn press_on_continuum(&mut self, dt: f64) {
         let stress = 1.0 / self.units.stress();
         let force = stress / self.units.length.powi(2);
-        let [handshake, inner] = self.layout.widths;
+        let zones = self.layout.widths;
         let full = self.full();
         for cell in 0..self.layout.cells.count() {
             let index = self.layout.cells.index(cell);
@@ -325,11 +313,8 @@ impl Bowl {
             let outside = &mut self.outside;
             outside.pressure[cell] = (pressure * stress).max(0.0);
             outside.stress[cell] = deviatoric.map(|s| s * stress);
-            outside.cover[cell] = ((part - COVERS[0]) / (COVERS[1] - COVERS[0])).clamp(0.0, 1.0);
-            outside.share[cell] = match part > LEAST_COVER {
-                true => ((label - handshake) / (inner - handshake)).clamp(0.0, 1.0),
-                false => 0.0,
-            };
+            outside.cover[cell] = joint::cover(part);
+            outside.share[cell] = joint::share(part, label, zones);
             outside.force[cell] = (self.owed[cell] * (force / dt)).into();
         }
     }
@@ -424,9 +409,8 @@ impl Bowl {
     pub(super) fn agree(&mut self) {
         self.slips();
         let dt = self.exchange_time();
-        let towards = |time: f64| (dt / time).min(1.0) / dt;
-        let rate = towards(self.spec.settings.relaxation_time);
-        let turn = towards(self.spec.settings.spin_time);
+        let rate = towards(dt, self.spec.settings.relaxation_time);
+        let turn = towards(dt, self.spec.settings.spin_time);
         let full = self.full();
         for cell in 0..self.layout.cells.count() {
             let cover = &self.sums.cover[cell];
@@ -438,7 +422,7 @@ impl Bowl {
             self.held.spins[cell] = match holds {
                 true => {
                     let material = rotation(&gradient(&self.view, &self.layout.cells, cell));
-                    turn * (material - cover.spin / cover.turning)
+                    turn * (material - over(cover.spin, cover.turning))
                 }
                 false => Vector3::zeros(),
             };

@@ -43,6 +43,7 @@ pub use zone::Zone;
 
 use super::OverlapError;
 use super::angular::AngularBook;
+use super::joint;
 use super::rest_stress::RestStress;
 use super::settings::{Resolved, check};
 use super::sighting::{Sighting, free_mass};
@@ -312,11 +313,6 @@ pub struct Bowl {
 }
 
 impl Bowl {
-    /// Steps of the grains for which loads are held, for a time step (s).
-    pub fn steps_of_loads(settings: &Resolved, timestep: f64) -> u64 {
-        (settings.load_time / timestep).round().max(1.0) as u64
-    }
-
     /// Cuts a bed at rest: what lies outside the box becomes continuum.
     ///
     /// # Errors
@@ -376,9 +372,8 @@ impl Bowl {
             f64::from(u8::from(is_bed))
         });
         let flow = continuum::bed(cells, fractions.collect(), &spec.law, &units, &spec.options)?;
-        let steps_of_loads = Self::steps_of_loads(&spec.settings, simulation.timestep());
-        let load_time = steps_of_loads as f64 * simulation.timestep();
-        let loads = (spec.settings.exchange_time / load_time).round().max(1.0);
+        let steps_of_loads = spec.settings.steps_of_loads(simulation.timestep());
+        let loads_of_exchange = spec.settings.loads_of_exchange(simulation.timestep());
         let count = cells.count();
         let zone = zone.clone();
         let mut bowl = Self {
@@ -409,7 +404,7 @@ impl Bowl {
             account: Account::default(),
             monitors: Monitors::default(),
             steps_of_loads,
-            loads_of_exchange: loads as u64,
+            loads_of_exchange,
             made: 0,
             exchanges: 0,
             timestep: simulation.timestep(),
@@ -528,7 +523,7 @@ impl Bowl {
 
     /// For how long what is laid has acted and is not booked yet (s).
     fn acting(&self, simulation: &Simulation) -> f64 {
-        simulation.kick_time(simulation.steps_done() - self.laid_at)
+        joint::acting(simulation, self.laid_at)
     }
 
     /// K_0 of the bed when it was cut.

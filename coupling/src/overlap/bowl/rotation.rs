@@ -1,7 +1,7 @@
 //! Uniform translation and rigid rotation of both sides at once exchange no force.
 
-use super::cells::over;
 use super::*;
+use crate::overlap::joint::vector_over as over;
 use crate::overlap::{OverlapSettings, Scales};
 use colluvium_dem::{ContactLaw, Domain, Grain, Hooke, Setup, TangentialSpring, Threads, Wall};
 

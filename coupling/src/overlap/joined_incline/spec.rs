@@ -71,8 +71,7 @@ impl JoinedInclineSpec {
     /// # Errors
     /// The first number out of range, by name.
     pub fn resolved(&self) -> Result<Resolved, OverlapError> {
-        let spec = self.overlap();
-        spec.settings.resolve(&spec.scales, true)
+        self.overlap().resolved()
     }
 
     /// Checks what can be checked before anything has flowed.

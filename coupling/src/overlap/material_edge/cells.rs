@@ -7,6 +7,7 @@
 //! ```
 //! l from the centre of the grain that f acts on to that of its partner, h_c at the middle of it; V = h² W.
 
+use crate::overlap::joint::over;
 use colluvium_dem::{GrainSample, Partner, Snapshot};
 
 /// Cells side by side over a floor that is level at z = 0, x fastest (SI).
@@ -119,11 +120,6 @@ impl Cover {
     pub fn label(&self) -> f64 {
         over(self.label, self.mass)
     }
-}
-
-/// A quotient, zero where there is nothing to divide by.
-pub fn over(sum: f64, by: f64) -> f64 {
-    if by > 0.0 { sum / by } else { 0.0 }
 }
 
 /// What cells know of the grains.

@@ -65,9 +65,9 @@ impl Continuum {
     ) -> Result<Self, OverlapError> {
         let keeper = layout::keeper(specs, &edges);
         let spec = specs[keeper];
-        let steps = MaterialEdge::steps_of_loads(&spec.settings, timestep);
+        let steps = spec.settings.steps_of_loads(timestep);
         let load_time = steps as f64 * timestep;
-        let loads = MaterialEdge::loads_of_exchange(&spec.settings, timestep);
+        let loads = spec.settings.loads_of_exchange(timestep);
         let column = spec.column(mass);
         let exchange = loads as f64 * load_time / (column.height / column.gravity).sqrt();
         // The copy is made anew at every exchange.

@@ -11,8 +11,8 @@
 //! and momentum that this adds are booked. Between two exchanges matter does come loose from the copy's end, by little and
 //! fast; it is made anew before it gets anywhere, and the next step's length must not remember how fast it was.
 
-use super::cells::over;
 use super::{Continuum, MaterialEdge, OverlapError};
+use crate::overlap::joint::over;
 
 /// A step planned as long as an exchange but for round-off would be made in two halves.
 pub(super) const ROUNDED: f64 = 1.0 + 1e-6;
@@ -36,7 +36,8 @@ impl MaterialEdge {
         let units = *continuum.collapse.units();
         let is_copy = |cell: usize| {
             let (i, k) = (cell % columns, cell / columns);
-            self.cells.face(i) >= self.held.handshake[k]
+            // Heights of grains count from z = 0: where ground is not level there is no copy of them.
+            self.cells.face(i) >= self.held.handshake[k].max(self.level)
         };
         for i in 0..columns {
             let column = (0..rows).map(|k| self.sums.cover[i + columns * k].mass);

@@ -1,18 +1,14 @@
 //! The steps: grains under what is held, and the exchange that follows so many of them.
 
-use super::cells::over;
 use super::embedded::Embedded;
 use super::rows::{Load, Row, bearers, slopes};
 use super::{Continuum, MaterialEdge, OverlapError, Side};
 use crate::overlap::angular::{AngularBook, Counterpart, Parts};
+use crate::overlap::joint::{self, LEAST_BUFFER, inertia, over, towards};
 use colluvium_continuum::units::Units;
 use colluvium_dem::{GrainSample, Load as Laid, Simulation};
 use nalgebra::Vector3;
 
-/// Cells with less of the mass of a full one are not spoken for by their grains.
-const LEAST_COVER: f64 = 0.3;
-/// Parts of a full cell's mass at which grains begin to cover a surface, and cover it all.
-const COVERS: [f64; 2] = [0.4, 0.7];
 /// Rows with less than this of a full row of shell hand on what presses on them: a force on few grains throws them out.
 pub(super) const LEAST_ROW: f64 = 0.3;
 /// Steepest slope of the edge that its area vector follows.
@@ -25,11 +21,6 @@ pub struct Scratch {
     pub(super) shell: Vec<Load>,
     bearers: Vec<usize>,
     forces: Vec<[f64; 2]>,
-}
-
-/// Moment of inertia of a ball (kg m²).
-fn inertia(grain: &GrainSample) -> f64 {
-    0.4 * grain.mass * grain.radius * grain.radius
 }
 
 /// A vector of the plane x–z in space.
@@ -288,7 +279,7 @@ impl MaterialEdge {
             1.0 / units.stress(),
             1.0 / (units.stress() * units.length * self.spec.slab),
         );
-        let [handshake, inner] = self.spec.zones();
+        let zones = self.spec.zones();
         let full = self.full();
         for cell in 0..self.cells.count() {
             let cover = &self.sums.cover[cell];
@@ -298,11 +289,8 @@ impl MaterialEdge {
             let outside = &mut self.outside;
             outside.pressure[cell] = (-0.5 * (xx + zz) * stress).max(0.0);
             outside.stress[cell] = [0.5 * (xx - zz) * stress, xz * stress];
-            outside.cover[cell] = ((part - COVERS[0]) / (COVERS[1] - COVERS[0])).clamp(0.0, 1.0);
-            outside.share[cell] = match part > LEAST_COVER {
-                true => ((cover.label() - handshake) / (inner - handshake)).clamp(0.0, 1.0),
-                false => 0.0,
-            };
+            outside.cover[cell] = joint::cover(part);
+            outside.share[cell] = joint::share(part, cover.label(), zones);
             self.outside.force[cell] = self.owed[cell].map(|owed| owed / dt * force);
         }
     }
@@ -386,13 +374,12 @@ impl MaterialEdge {
     pub(super) fn agree(&mut self) {
         self.slips();
         let dt = self.exchange_time();
-        let towards = |time: f64| (dt / time).min(1.0) / dt;
-        let rate = towards(self.spec.settings.relaxation_time);
-        let turn = towards(self.spec.settings.spin_time);
+        let rate = towards(dt, self.spec.settings.relaxation_time);
+        let turn = towards(dt, self.spec.settings.spin_time);
         let full = self.full();
         for cell in 0..self.cells.count() {
             let cover = &self.sums.cover[cell];
-            let holds = self.view.is_full(cell) && cover.buffer > 0.1 * full;
+            let holds = self.view.is_full(cell) && cover.buffer > LEAST_BUFFER * full;
             self.held.accelerations[cell] = match holds {
                 true => cover.buffer_slip.map(|slip| rate * slip / cover.buffer),
                 false => [0.0; 2],

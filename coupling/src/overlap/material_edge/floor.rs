@@ -8,12 +8,13 @@
 //! Force and impulse of the ground on the continuum are those of a wall: part of what an account says it had from walls
 //! and surface.
 
+use super::travel::BY_GROUND;
 use super::{MaterialEdge, MaterialEdgeSpec, OverlapError, Side, Travel};
 use colluvium_continuum::column_collapse::CollapseGround;
 use colluvium_continuum::terrain::Profile;
 
 /// Ground that is off by less than this part of a cell is level.
-const LEVEL: f64 = 1e-9;
+pub const LEVEL: f64 = 1e-9;
 /// Part of a full cell's mass in grains of the overlap from which on a row has some.
 const COVERED: f64 = 0.3;
 
@@ -83,7 +84,8 @@ pub(super) fn check(ground: &CollapseGround, spec: &MaterialEdgeSpec) -> Result<
 }
 
 impl MaterialEdge {
-    /// Moves inwards that were not made, as the ground there is not level: how many, and when the first (s).
+    /// Moves inwards that were not made, as the ground there is not level: how many, each counted once until it is made or no
+    /// longer wanted, and when the first (s).
     pub fn stopped_moves(&self) -> Option<(f64, f64)> {
         let [count, first] = self.journey.stopped;
         (count > 0.0).then_some((count, first))
@@ -120,11 +122,13 @@ impl MaterialEdge {
         if self.least_place() - travel.width >= self.level {
             return true;
         }
-        let [count, first] = &mut self.journey.stopped;
-        if *count == 0.0 {
-            *first = time;
+        if self.journey.refuse(BY_GROUND) {
+            let [count, first] = &mut self.journey.stopped;
+            if *count == 0.0 {
+                *first = time;
+            }
+            *count += 1.0;
         }
-        *count += 1.0;
         false
     }
 }

@@ -69,6 +69,7 @@ impl MaterialEdge {
             journey.refused,
             journey.stopped[0],
             journey.stopped[1],
+            journey.refusing,
             journey.displaced,
             journey.strips.len() as f64,
         ]);
@@ -142,6 +143,7 @@ impl MaterialEdge {
                 refused,
                 stopped,
                 first,
+                refusing,
                 displaced,
                 strips,
             ],
@@ -172,6 +174,7 @@ impl MaterialEdge {
             returns,
             refused,
             stopped: [stopped, first],
+            refusing,
             displaced,
         };
         let Some([stress, accelerations, spins, edge_rows, handshake, owed]) =

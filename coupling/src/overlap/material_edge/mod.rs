@@ -49,12 +49,14 @@ mod zone;
 pub use account::{Account, Monitors};
 pub use cells::Cells;
 pub use continuum::Continuum;
+pub use floor::LEVEL;
 pub use side::Side;
 pub use travel::{Move, Travel};
 pub use witness::{Through, Witness};
 pub use zone::GrainZone;
 
 use super::OverlapError;
+use super::joint;
 use super::rest_stress::RestStress;
 use super::settings::Resolved;
 use super::sighting::{Sighting, free_grains};
@@ -217,17 +219,6 @@ pub struct MaterialEdge {
 }
 
 impl MaterialEdge {
-    /// Steps of the grains for which loads are held, for a time step (s).
-    pub fn steps_of_loads(settings: &Resolved, timestep: f64) -> u64 {
-        (settings.load_time / timestep).round().max(1.0) as u64
-    }
-
-    /// Loads until an exchange, for a time step (s).
-    fn loads_of_exchange(settings: &Resolved, timestep: f64) -> u64 {
-        let load_time = Self::steps_of_loads(settings, timestep) as f64 * timestep;
-        (settings.exchange_time / load_time).round().max(1.0) as u64
-    }
-
     /// Gives its grains their labels, those too that become its continuum and are still there.
     fn mark(
         spec: MaterialEdgeSpec,
@@ -311,8 +302,8 @@ impl MaterialEdge {
             owed: vec![[0.0; 2]; cells.count()],
             account: Account::default(),
             monitors: Monitors::default(),
-            steps_of_loads: Self::steps_of_loads(&spec.settings, timestep),
-            loads_of_exchange: Self::loads_of_exchange(&spec.settings, timestep),
+            steps_of_loads: spec.settings.steps_of_loads(timestep),
+            loads_of_exchange: spec.settings.loads_of_exchange(timestep),
             made: 0,
             exchanges: 0,
             timestep,
@@ -377,7 +368,7 @@ impl MaterialEdge {
 
     /// For how long what is laid has acted and is not booked yet (s).
     fn acting(&self, simulation: &Simulation) -> f64 {
-        simulation.kick_time(simulation.steps_done() - self.laid_at)
+        joint::acting(simulation, self.laid_at)
     }
 
     /// Momentum that the continuum has still to take from the relaxation (N s).

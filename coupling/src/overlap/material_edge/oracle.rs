@@ -1,9 +1,9 @@
 //! Where grains are needed behind an edge that moves.
 
 use super::MaterialEdge;
-use super::cells::over;
 use super::travel::Travel;
 use crate::overlap::dense_limits::{Dilution, LEAST_PRESSURE, Reason};
+use crate::overlap::joint::over;
 
 impl MaterialEdge {
     /// Why the strip behind the edge has to be grains, asked in this order: it moves; the grains of the inner overlap are loose,

@@ -2,7 +2,10 @@
 
 use super::*;
 use crate::overlap::{OverlapSettings, Scales};
+use colluvium_continuum::column_collapse::CollapseGround;
+use colluvium_continuum::free_surface::Contact;
 use colluvium_continuum::rheology::MuI;
+use colluvium_continuum::terrain::Profile;
 use colluvium_dem::{ContactLaw, Domain, Grain, Hooke, Setup, TangentialSpring, Threads, Wall};
 use nalgebra::Vector3;
 
@@ -26,13 +29,14 @@ fn grains(spin: Vector3<f64>) -> Vec<Grain> {
     (0..count).map(ball).collect()
 }
 
-fn joined(rate: f64, drift: [f64; 2], ours: f64) -> (GrainZone, Simulation) {
+/// Those of them on a floor.
+fn lattice(spin: Vector3<f64>) -> Simulation {
     let law = ContactLaw::linear(
         Hooke::matched(1e4, 0.5),
         TangentialSpring::matched(2.0 / 7.0, 0.5, 0.5),
         None,
     );
-    let mut simulation = Simulation::new(Setup {
+    Simulation::new(Setup {
         domain: Domain {
             lower: Vector3::new(0.0, 0.0, -1.0),
             upper: Vector3::new(3.0 * LENGTH, WIDTH, 4.0 * HEIGHT),
@@ -40,13 +44,17 @@ fn joined(rate: f64, drift: [f64; 2], ours: f64) -> (GrainZone, Simulation) {
         },
         gravity: -Vector3::z(),
         law: law.into(),
-        grains: grains(-ours * Vector3::y()),
+        grains: grains(spin),
         walls: vec![Wall::plane(Vector3::zeros(), Vector3::z())],
         bodies: Vec::new(),
         timestep: 1e-3,
         threads: Threads::Serial,
     })
-    .unwrap();
+    .unwrap()
+}
+
+/// Continuum at the wall, up to an edge, with settings as nothing says.
+fn behind_edge(travel: Option<Travel>) -> MaterialEdgeSpec {
     let scales = Scales {
         diameter: 1.0,
         time: 1.0,
@@ -54,7 +62,7 @@ fn joined(rate: f64, drift: [f64; 2], ours: f64) -> (GrainZone, Simulation) {
         stiffness: 1e4,
     };
     let settings = OverlapSettings::default();
-    let spec = MaterialEdgeSpec {
+    MaterialEdgeSpec {
         case: CollapseCase {
             aspect: HEIGHT / LENGTH,
             height: HEIGHT,
@@ -71,9 +79,13 @@ fn joined(rate: f64, drift: [f64; 2], ours: f64) -> (GrainZone, Simulation) {
         back: 0.0,
         slab: WIDTH,
         settings: settings.resolve(&scales, false).unwrap(),
-        travel: None,
-    };
-    let mut zone = GrainZone::cut(&[spec], None, &mut simulation).unwrap();
+        travel,
+    }
+}
+
+fn joined(rate: f64, drift: [f64; 2], ours: f64) -> (GrainZone, Simulation) {
+    let mut simulation = lattice(-ours * Vector3::y());
+    let mut zone = GrainZone::cut(&[behind_edge(None)], None, &mut simulation).unwrap();
     let (edge, continuum) = (&mut zone.edges[0], &mut zone.continua[0]);
     let centre = [EDGE, 0.5 * HEIGHT];
     let turn = |rate: f64, x: f64, z: f64| {
@@ -125,7 +137,7 @@ fn exchanged(edge: &MaterialEdge) -> [f64; 3] {
     let spins = spins.map(|a| a.abs()).fold(0.0, f64::max);
     let forces = inside.map(|k| {
         let load = &edge.scratch.shell[k];
-        let slip = load.slip.map(|p| cells::over(p, load.weight));
+        let slip = load.slip.map(|p| joint::over(p, load.weight));
         let force = edge.held.rows[k].impedance(edge.spec.settings.impedance, slip);
         force[0].hypot(force[1])
     });
@@ -186,4 +198,91 @@ fn a_couple_is_answered_by_forces_of_its_moment() {
     }
     assert!(force.iter().all(|f: &f64| f.abs() < 1e-15), "{force:?}");
     assert!((moment + 0.3).abs() < 1e-14, "{moment}");
+}
+
+const TRAVEL: Travel = Travel {
+    width: 3.0,
+    rest: 0.05,
+    wake: 0.06,
+    hold: 0.4,
+    budget: f64::INFINITY,
+    fewest: 20.0,
+    dense: crate::overlap::DenseLimits::NONE,
+};
+
+/// Where grains are put back, cells of the inner overlap bear at once what the continuum bore there, and no average of what was behind
+/// the edge or in its shell.
+#[test]
+fn grains_that_come_back_bear_what_the_continuum_bore() {
+    let mut simulation = lattice(Vector3::zeros());
+    let spec = behind_edge(Some(TRAVEL));
+    let mut zone = GrainZone::cut(&[spec], None, &mut simulation).unwrap();
+    let edge = &mut zone.edges[0];
+    let columns = edge.cells.counts[0];
+    // As of many exchanges with no grains behind the edge.
+    edge.sums.stress.fill([0.0; 3]);
+    let depth = |cell: usize| HEIGHT - edge.cells.height(cell / columns);
+    let pressure = (0..edge.cells.count()).map(|cell| spec.density() * depth(cell).max(0.0));
+    edge.view.pressure = pressure.collect();
+    edge.view.stress.fill([0.0; 2]);
+    edge.view.rest.ratio = 0.6;
+    let before = edge.held.handshake.clone();
+    let reason = (crate::overlap::Reason::Speed, 0.1);
+    assert!(edge.come_back(&TRAVEL, reason, &mut simulation).unwrap());
+    let [handshake, inner] = spec.zones();
+    let mut count = 0;
+    for (cell, [xx, zz, xz]) in edge.sums.stress.iter().enumerate() {
+        let (cover, centre) = (&edge.sums.cover[cell], edge.cells.centre(cell % columns));
+        let is_inner = cover.mass > 0.0 && (handshake..inner).contains(&cover.label());
+        if !is_inner || !edge.view.is_full(cell) || centre > before[cell / columns] {
+            continue;
+        }
+        let weight = edge.view.pressure[cell];
+        assert!((zz + weight).abs() < 1e-9 * weight && *xz == 0.0, "{zz}");
+        assert!((xx / zz - 0.6).abs() < 1e-9, "{xx} {zz}");
+        count += 1;
+    }
+    assert!(count > 10, "{count}");
+    // What was beyond the handshake surface keeps its average.
+    let far = edge.cells.counts[1] / 2 * columns + (EDGE + handshake) as usize + 2;
+    assert_eq!(edge.sums.stress[far], [0.0; 3]);
+}
+
+/// A continuum with the front over a step down, the handshake surface of whose lowest rows has come to beyond the step: what has run
+/// down there is no copy, stays and is not booked.
+#[test]
+fn what_lies_below_the_floor_is_no_copy() {
+    let (foot, far) = (LENGTH + 0.5, 60.0);
+    let line = vec![[0.0, 0.0], [foot, 0.0], [foot, -2.0], [far + 5.0, -2.0]];
+    let ground = CollapseGround {
+        profile: Profile::new(line).unwrap(),
+        contact: Contact::NoSlip,
+    };
+    let mut spec = MaterialEdgeSpec {
+        side: Side::Above,
+        place: EDGE - LENGTH,
+        wall: -far,
+        back: -LENGTH,
+        ..behind_edge(None)
+    };
+    spec.case.cells = far as usize;
+    spec.case.length_scaled = far / HEIGHT;
+    let mut simulation = lattice(Vector3::zeros());
+    let mut zone = GrainZone::cut(&[spec], Some(&ground), &mut simulation).unwrap();
+    let (edge, continuum) = (&mut zone.edges[0], &mut zone.continua[0]);
+    let (columns, below) = (edge.cells.counts[0], edge.cells.below);
+    assert!(below > 0 && edge.level == -foot);
+    let mut state = continuum.collapse.flow().state().clone();
+    let down: Vec<usize> = (0..columns)
+        .filter(|i| (-foot - 5.0..-foot - 2.0).contains(&edge.cells.centre(*i)))
+        .collect();
+    for &cell in &down {
+        state.fractions[cell] = 0.8;
+    }
+    continuum.collapse.set_state(state).unwrap();
+    edge.look_at(continuum);
+    edge.held.handshake[..below].fill(-foot - 7.0);
+    edge.copy_the_grains(continuum, f64::INFINITY).unwrap();
+    let now = &continuum.collapse.flow().state().fractions;
+    assert!(down.len() == 3 && down.iter().all(|cell| now[*cell] == 0.8));
 }

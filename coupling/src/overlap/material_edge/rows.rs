@@ -5,7 +5,8 @@
 //! traction on it is T = σ A; to it comes the impedance, −Z |A| (s·n) n, with s the mean of v − u over the shell's grains,
 //! u at each one's place: what moves and turns as one feels none of it.
 
-use super::cells::{Cells, over};
+use super::cells::Cells;
+use crate::overlap::joint::over;
 
 /// What a row of the edge is pressed with until the next exchange.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]

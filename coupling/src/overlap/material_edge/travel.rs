@@ -12,8 +12,8 @@
 //!
 //! A move gives all labels anew, by where grains are: what has mixed since they were given is cut along a clean edge.
 //! Each return doubles the rest that the next move outwards waits for: the two thresholds and this keep the edge from
-//! going to and fro. A move inwards that a budget of grains does not allow is refused and counted, and so is one to where the ground is not level. Mass changes hands
-//! at the edge alone, by whole strips; momentum that goes with it is booked. Every move is kept with its reason
+//! going to and fro. A move inwards that a budget of grains does not allow is refused, and so is one to where the ground is not
+//! level; it is counted once until it is made or no longer wanted, or refused for the other reason. Mass changes hands at the edge alone, by whole strips; momentum that goes with it is booked. Every move is kept with its reason
 //! ([`Move`]).
 
 use super::{Continuum, MaterialEdge, OverlapError};
@@ -32,7 +32,7 @@ pub struct Travel {
     pub wake: f64,
     /// How long grains have to rest (s).
     pub hold: f64,
-    /// Most grains, fixed ones included.
+    /// Most free grains; those that are fixed, the floor, cost no steps of their own and do not count.
     pub budget: f64,
     /// Fewest free grains beyond the overlap.
     pub fewest: f64,
@@ -109,8 +109,22 @@ pub(super) struct Journey {
     pub refused: f64,
     /// How many, and when the first (s).
     pub stopped: [f64; 2],
+    /// Why the move inwards that is wanted now is not made: [`NOT_REFUSED`], [`BY_BUDGET`] or [`BY_GROUND`].
+    pub refusing: f64,
     /// Grains that were laid on top because their place was taken.
     pub displaced: f64,
+}
+
+/// What refuses a move inwards, as numbers of a record.
+pub(super) const NOT_REFUSED: f64 = 0.0;
+pub(super) const BY_BUDGET: f64 = 1.0;
+pub(super) const BY_GROUND: f64 = 2.0;
+
+impl Journey {
+    /// Notes why a move inwards is not made; whether it is another one than was refused for that before.
+    pub fn refuse(&mut self, why: f64) -> bool {
+        std::mem::replace(&mut self.refusing, why) != why
+    }
 }
 
 /// Share of the sum of radii by which a grain that is put back may overlap with one that is there.
@@ -201,6 +215,7 @@ impl MaterialEdge {
             self.journey.resting = 0.0;
             return self.come_back(&travel, reason, simulation);
         }
+        self.journey.refusing = NOT_REFUSED;
         let Beside {
             speed,
             front,
@@ -250,7 +265,7 @@ impl MaterialEdge {
             masses[side] += grain.mass;
             count += side as f64;
         }
-        let speed = |side: usize| super::cells::over(sums[side], masses[side]).sqrt();
+        let speed = |side: usize| crate::overlap::joint::over(sums[side], masses[side]).sqrt();
         Beside {
             speed: speed(0),
             front: speed(1),
@@ -312,7 +327,7 @@ impl MaterialEdge {
         Ok(())
     }
 
-    fn come_back(
+    pub(super) fn come_back(
         &mut self,
         travel: &Travel,
         reason: (Reason, f64),
@@ -322,14 +337,19 @@ impl MaterialEdge {
             return Ok(false);
         }
         let strips = &self.journey.strips;
-        let more = strips.last().map_or(0, |patch| patch.grains.len());
-        if (simulation.grain_count() + more) as f64 > travel.budget {
-            self.journey.refused += 1.0;
+        let more = strips.last().map_or(0, |patch| {
+            patch.grains.iter().filter(|grain| !grain.fixed).count()
+        });
+        let now = simulation.held(|_| true).filter(|g| !g.fixed).count();
+        if (now + more) as f64 > travel.budget {
+            let is_new = self.journey.refuse(BY_BUDGET);
+            self.journey.refused += f64::from(u8::from(is_new));
             return Ok(false);
         }
         let Some(mut patch) = self.journey.strips.pop() else {
             return Ok(false);
         };
+        self.journey.refusing = NOT_REFUSED;
         for grain in &mut patch.grains {
             grain.spin = Vector3::zeros();
         }
@@ -348,8 +368,23 @@ impl MaterialEdge {
         self.give_labels(places);
         self.labels.edge -= travel.width;
         self.journey.returns += 1.0;
+        let handshake = self.held.handshake.clone();
         self.handed(reason, mass, before, simulation);
+        self.believe_the_continuum(&handshake);
         Ok(true)
+    }
+
+    /// Cells in front of the edge that lay behind the handshake surface, then at these places row by row (m), have averages of no grains,
+    /// or of a shell that bore forces from outside: they take the continuum's stress until their grains have one.
+    fn believe_the_continuum(&mut self, before: &[f64]) {
+        let columns = self.cells.counts[0];
+        for (cell, stress) in self.sums.stress.iter_mut().enumerate() {
+            let (centre, k) = (self.cells.centre(cell % columns), cell / columns);
+            let is_new = centre < before[k] && centre > self.held.rows[k].place;
+            if is_new && self.view.is_full(cell) {
+                *stress = self.view.stress_of_grains(cell, 1.0);
+            }
+        }
     }
 
     /// Books a move, and agrees on what holds after it.
@@ -433,6 +468,16 @@ mod tests {
         let top = &grains[0].position;
         assert!((top - grains[1].position).norm() > 1.0 - 1e-12, "{top}");
         assert!((top.z - 1.5 - (1.0_f64 - 0.01).sqrt()).abs() < 1e-12);
+    }
+
+    #[test]
+    fn a_move_that_goes_on_being_refused_is_one() {
+        let mut journey = Journey::default();
+        let (budget, ground) = (BY_BUDGET, BY_GROUND);
+        let told = [budget, budget, ground, ground, budget].map(|why| journey.refuse(why));
+        assert_eq!(told, [true, false, true, false, true]);
+        journey.refusing = NOT_REFUSED;
+        assert!(journey.refuse(budget));
     }
 
     #[test]

@@ -118,6 +118,13 @@ impl View {
         (weight > 0.0).then(|| sum.map(|s| s / weight))
     }
 
+    /// σ_xx with what is remembered, σ_zz, σ_xz (Pa) of a cell, for so many times its pressure.
+    pub fn stress_of_grains(&self, cell: usize, factor: f64) -> [f64; 3] {
+        let (p, [s, tau]) = (factor * self.pressure[cell].max(0.0), self.stress[cell]);
+        let zz = -s - p;
+        [self.rest.of_grains(cell, s - p, zz), zz, tau]
+    }
+
     /// Filled part, σ_xx with what is remembered, σ_zz, σ_xz (Pa) and velocity at a place in a row, from the cells beside it;
     /// none where neither is full.
     pub fn across(&self, cells: &Cells, x: f64, row: usize) -> Option<(f64, [f64; 3], [f64; 2])> {
@@ -142,10 +149,7 @@ impl View {
                 true => (f / (2.0 * f - 1.0)).min(LARGEST_FACTOR),
                 false => 1.0,
             };
-            let (p, [s, tau]) = (factor * self.pressure[cell].max(0.0), self.stress[cell]);
-            let zz = -s - p;
-            let xx = self.rest.of_grains(cell, s - p, zz);
-            for (sum, part) in sigma.iter_mut().zip([xx, zz, tau]) {
+            for (sum, part) in sigma.iter_mut().zip(self.stress_of_grains(cell, factor)) {
                 *sum += hat * part;
             }
             for (sum, u) in velocity.iter_mut().zip(self.velocity[cell]) {

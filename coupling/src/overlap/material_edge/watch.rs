@@ -1,10 +1,10 @@
 //! What the monitors look at after every exchange.
 
 use super::MaterialEdge;
-use super::cells::over;
 use super::exchange::STEEPEST;
 use super::rows::slopes;
 use super::witness::Through;
+use crate::overlap::joint::over;
 use colluvium_dem::GrainSample;
 use nalgebra::Vector3;
 

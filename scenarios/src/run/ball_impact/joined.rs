@@ -272,7 +272,7 @@ impl Recipe for JoinedBed<'_> {
 
     fn steer_every(&self, timestep: f64) -> u64 {
         let settings = self.scene.overlap_settings(&self.origin);
-        settings.map_or(u64::MAX, |s| Bowl::steps_of_loads(&s, timestep))
+        settings.map_or(u64::MAX, |s| s.steps_of_loads(timestep))
     }
 
     fn steer(&self, simulation: &mut Simulation, state: &mut Vec<f64>) -> Result<Course, Failure> {

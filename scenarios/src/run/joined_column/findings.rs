@@ -287,16 +287,23 @@ impl JoinedColumn<'_> {
         let account = zone.account(&ran.simulation);
         let grains = account.grains_error(zone.grain_momentum(&mut ran.simulation));
         let exchange = account.exchange_error(zone.owed(&ran.simulation));
-        summary.ledger.mass_relative = zone.volume_error();
+        let volume = zone.volume_error();
+        let mass = zone.mass_error(&ran.simulation);
+        summary.ledger.mass_relative = f64::max(volume.abs(), mass.abs());
         summary.put(
             "handshake_mass",
-            Quantity::new(zone.mass_error(&ran.simulation), "1").against(
+            Quantity::new(mass, "1").against(
                 0.0,
                 "mass of grains and continuum on their sides of the handshake surface over that at the start, less 1",
             ),
         );
         summary.ledger.momentum_relative = Some(grains.max(exchange));
         for (name, value, source) in [
+            (
+                "ledger_volume",
+                volume,
+                "volume of the continuum against its account, what its copy was given included, relative",
+            ),
             (
                 "ledger_grains",
                 grains,
@@ -600,7 +607,7 @@ fn moves(zone: &GrainZone, summary: &mut Summary) -> Option<Table> {
     for edge in edges {
         if let Some((times, first)) = edge.stopped_moves() {
             summary.remarks.push(format!(
-                "At {times} exchanges, the first at t = {first:.4} s, the edge that is now at {:.4} m was to come back and did not: the ground there is not level.",
+                "{times} moves inwards of the edge that is now at {:.4} m, the first at t = {first:.4} s, were not made: the ground there is not level.",
                 edge.spec().side.along(edge.spec().place + edge.travelled())
             ));
         }

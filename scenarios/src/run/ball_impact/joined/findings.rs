@@ -34,13 +34,20 @@ impl JoinedBed<'_> {
         let account = bowl.account(&ran.simulation);
         let grains = account.grains_error(bowl.grain_momentum(&mut ran.simulation));
         let exchange = account.exchange_error(bowl.owed(&ran.simulation));
-        summary.ledger.mass_relative = bowl.volume_error();
+        let volume = bowl.volume_error();
+        let mass = bowl.mass_error(&ran.simulation);
+        summary.ledger.mass_relative = f64::max(volume.abs(), mass.abs());
         summary.ledger.momentum_relative = Some(grains.max(exchange));
         for (name, value, source) in [
             (
                 "handshake_mass",
-                bowl.mass_error(&ran.simulation),
+                mass,
                 "mass of grains and continuum on their sides of the handshake surface over that of the bed, less 1",
+            ),
+            (
+                "ledger_volume",
+                volume,
+                "volume of the continuum against its account, what its copy was given included, relative",
             ),
             (
                 "ledger_grains",
