@@ -296,6 +296,7 @@ mod tests {
                 assert_eq!(well_posed, t.well_posedness(rate) + by_middle <= 0.0);
             }
         }
-        assert!(differs.iter().all(|n| *n > 5), "{differs:?}");
+        // Mostly to the better: what makes flows less well posed is of second order in κ_p.
+        assert!(differs[0] > 0 && differs[1] > 20, "{differs:?}");
     }
 }
