@@ -67,12 +67,24 @@ pub enum Error {
     /// The sparse linear system could not be factorised.
     #[error("sparse factorisation failed: {0}")]
     LinearSolver(String),
+    /// A linear system has no solution.
+    #[error("singular linear system: {0}")]
+    Singular(String),
     /// The caller asked to stop.
     #[error("stopped on request after {steps} steps")]
     Stopped {
         /// Steps made before the stop.
         steps: usize,
     },
+}
+
+/// Whether a linear system was solved: that it has no solution is no error of the step, but of memory or patterns is.
+pub(crate) fn is_solved(outcome: Result<(), Error>) -> Result<bool, Error> {
+    match outcome {
+        Ok(()) => Ok(true),
+        Err(Error::Singular(_)) => Ok(false),
+        Err(error) => Err(error),
+    }
 }
 
 /// Checks that a value is finite and satisfies a condition, naming the key if it does not.
@@ -90,5 +102,18 @@ pub(crate) fn require(
             value,
             allowed: allowed.into(),
         })
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn only_singular_systems_are_no_errors() {
+        assert_eq!(is_solved(Ok(())), Ok(true));
+        assert_eq!(is_solved(Err(Error::Singular("pivot".into()))), Ok(false));
+        let memory = Error::LinearSolver("out of memory".into());
+        assert_eq!(is_solved(Err(memory.clone())), Err(memory));
     }
 }

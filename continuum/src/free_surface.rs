@@ -6,8 +6,7 @@
 //! stress at once. Cells without material cost next to nothing.
 //!
 //! The same code moves material in a plane ([`SurfaceFlow`]) and in space ([`SpaceFlow`]): the number of axes
-//! is a constant of its types. Ground that cuts cells, and walls beside it that
-//! it does not resolve, are known in a plane only.
+//! is a constant of its types. Walls beside it that the grid does not resolve are known in a plane only.
 
 mod distances;
 mod faces;
@@ -21,6 +20,7 @@ mod operators;
 mod outside;
 pub mod plane;
 mod sliding;
+mod standing;
 mod topology;
 mod transport;
 

@@ -48,10 +48,15 @@ pub trait Rheology: Sync {
     /// pressure.
     fn potential(&self, rate: f64, pressure: f64) -> f64;
 
-    /// Whether the equations of motion are well posed at this strain rate and pressure (short
+    /// Whether the equations of motion are well posed in plane flow at this strain rate and pressure (short
     /// waves do not grow at a rate without bound).
     fn is_well_posed(&self, rate: f64, pressure: f64) -> bool {
-        pressure > 0.0 && self.threshold(rate, pressure).is_well_posed(rate)
+        self.is_well_posed_in_space(rate, pressure, 0.0)
+    }
+
+    /// The same in a flow with the middle eigenvalue λ₂ of 2D/γ̇.
+    fn is_well_posed_in_space(&self, rate: f64, pressure: f64, middle: f64) -> bool {
+        pressure > 0.0 && self.threshold(rate, pressure).is_well_posed(rate, middle)
     }
 
     /// The same law with lengths, densities and stresses divided by the given units.

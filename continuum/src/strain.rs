@@ -12,6 +12,8 @@
 //! ((τ_xx − τ_yy)/2, (τ_xx + τ_yy − 2 τ_zz)/(2√3), τ_xy, τ_xz, τ_yz) in space, so that
 //! |τ|² = ½ τ:τ is the sum of their squares too.
 
+use crate::rheology::strain_rate_norm;
+
 /// Components of the strain rate in space.
 pub const SPACE_COMPONENTS: usize = 5;
 /// Most velocities that a quadrature point in space depends on: six faces of the cell, and two more across
@@ -39,6 +41,23 @@ pub(crate) fn shear_row<const D: usize>(low: usize, high: usize) -> usize {
     if D == 2 { 1 } else { low + high + 1 }
 }
 
+/// The middle eigenvalue λ₂ of A = 2D/γ̇, 0 in plane flow: with tr A = 0 and A:A = 2 the eigenvalues are the roots of
+/// λ³ − λ = det A, and λ₂ = (2/√3) sin(θ), sin 3θ = −(3√3/2) det A, |θ| ≤ π/6.
+pub(crate) fn middle_stretching<const C: usize>(rate: &[f64; C]) -> f64 {
+    let norm = strain_rate_norm(*rate);
+    let &[a, b, xy, xz, yz] = rate.as_slice() else {
+        return 0.0;
+    };
+    if norm == 0.0 {
+        return 0.0;
+    }
+    let [xx, yy, zz] = deviator([a, b, xy, xz, yz]);
+    let determinant =
+        xx * (yy * zz - yz * yz) - xy * (xy * zz - yz * xz) + xz * (xy * yz - yy * xz);
+    let sine = -1.5 * 3.0_f64.sqrt() * determinant / norm.powi(3);
+    2.0 * THIRD_ROOT * (libm::asin(sine.clamp(-1.0, 1.0)) / 3.0).sin()
+}
+
 /// τ_xx, τ_yy and τ_zz of a stress in space.
 pub fn deviator(stress: [f64; SPACE_COMPONENTS]) -> [f64; 3] {
     let level = THIRD_ROOT * stress[1];
@@ -48,7 +67,6 @@ pub fn deviator(stress: [f64; SPACE_COMPONENTS]) -> [f64; 3] {
 #[cfg(test)]
 mod tests {
     use super::*;
-    use crate::rheology::strain_rate_norm;
 
     /// Components of a velocity gradient without divergence, `gradient[i][j]` = ∂u_i/∂x_j.
     fn components(gradient: [[f64; 3]; 3]) -> [f64; SPACE_COMPONENTS] {
@@ -98,5 +116,30 @@ mod tests {
             (gradient[a][a], gradient[b][b], gradient[a][b]) = (0.7, -0.7, 1.3);
             assert!((strain_rate_norm(components(gradient)) - plane).abs() < 1e-15);
         }
+    }
+
+    /// λ₂ solves λ³ − λ = det A and lies between the two others; stretching along one axis, along two, and in a plane.
+    #[test]
+    fn the_middle_stretching_is_an_eigenvalue() {
+        let gradient = [[0.3, 1.1, -0.6], [-0.4, 0.5, 0.9], [0.2, -1.7, -0.8]];
+        let rate = components(gradient);
+        let norm = strain_rate_norm(rate);
+        let a = |i: usize, j: usize| (gradient[i][j] + gradient[j][i]) / norm;
+        let middle = middle_stretching(&rate);
+        let determinant = |l: f64| {
+            let d = |i: usize| a(i, i) - l;
+            d(0) * (d(1) * d(2) - a(1, 2) * a(1, 2))
+                - a(0, 1) * (a(0, 1) * d(2) - a(1, 2) * a(0, 2))
+                + a(0, 2) * (a(0, 1) * a(1, 2) - d(1) * a(0, 2))
+        };
+        assert!(determinant(middle).abs() < 1e-14);
+        // −λ³ + λ + det A rises through the middle one of its roots.
+        assert!(determinant(middle + 1e-3) > 0.0 && determinant(middle - 1e-3) < 0.0);
+        let diagonal = |x, y, z| components([[x, 0.0, 0.0], [0.0, y, 0.0], [0.0, 0.0, z]]);
+        let near = |rate: [f64; 5], value: f64| (middle_stretching(&rate) - value).abs() < 1e-7;
+        assert!(near(diagonal(-0.2, 0.4, -0.2), -THIRD_ROOT));
+        assert!(near(diagonal(3.0, 3.0, -6.0), THIRD_ROOT));
+        assert!(near(diagonal(1.0, 0.0, -1.0), 0.0));
+        assert_eq!(middle_stretching(&[0.3, 0.7]), 0.0);
     }
 }

@@ -121,6 +121,9 @@ pub struct StepReport {
     pub held_points: usize,
     /// Residuals at the end.
     pub residuals: Residuals,
+    /// What they were allowed to be: momentum and stress by how fast the fastest unknown moves, not by where the residual
+    /// is ([`PrimalDualOptions::tolerance_in_motion`]).
+    pub allowed: Residuals,
     /// Whether all residuals are within tolerance.
     pub converged: bool,
 }
@@ -136,7 +139,8 @@ pub trait YieldSolver<
     /// Advances `state`, which is changed only if the report says that the step converged.
     ///
     /// # Errors
-    /// [`Error::LinearSolver`] if memory runs out; a step that merely does not converge is not an
+    /// [`Error::LinearSolver`] if memory runs out; a step that merely does not converge, for want of a solution of a
+    /// linear system too, is not an
     /// error but a report, and the caller cuts the time step.
     fn step(
         &mut self,

@@ -377,3 +377,66 @@ fn standing_wave_over_three_periods() {
         assert!(error < 5e-3, "{error:e}");
     }
 }
+
+/// Largest miss of the shear stress of cells against the exact mean over their filled part, s (1 − z) under a level
+/// surface at z = 1, over s; and of the cell on the floor alone.
+fn misses_of_stress(flow: &SurfaceFlow<MuI>, s: f64) -> [f64; 2] {
+    let misses = flow.cell_fields().into_iter().map(|field| {
+        let height = field.upper[1] - field.lower[1];
+        let middle = field.lower[1] + 0.5 * field.fraction * height;
+        (field.stress[1] - s * (1.0 - middle)).abs() / s
+    });
+    let misses: Vec<f64> = misses.collect();
+    [misses.iter().copied().fold(0.0, f64::max), misses[0]]
+}
+
+/// However full the highest cell is. (On an axis along which nothing varies a cell has half of the corners.)
+#[test]
+fn stress_of_a_cell_is_the_mean_over_its_filled_part() {
+    for depth in [0.2, 0.5, 0.51, 0.75, 1.0] {
+        let (flow, _) = bagnold(10, 1.0 / (8.0 + depth));
+        let [worst, _] = misses_of_stress(&flow, 0.43f64.sin());
+        assert!(worst < 1e-6, "{depth}: {worst}");
+        // What flows down the slope moves along the flat axis, too.
+        assert!(flow.cell_fields()[4].velocity[0] > 1.0);
+    }
+}
+
+/// A block that slides down a rough board bears what the board does, μ_w p on it and less above, in the cells on the board
+/// as in the others.
+#[test]
+fn stress_beside_a_sliding_wall_is_that_of_the_wall() {
+    let (cells, slope, friction) = (5, 0.4_f64, 0.2);
+    let h = 1.25 / cells as f64;
+    let wall = WallFriction {
+        friction,
+        cohesion: 0.0,
+    };
+    let board = Boundary::CoulombWall {
+        velocity: 0.0,
+        friction: wall,
+    };
+    let along = Axis::Periodic {
+        length: 4.0 * h,
+        cells: 4,
+    };
+    for (x, columns) in [(Axis::Flat, 1), (along, 4)] {
+        let grid = Grid::with_moving_surface([x, bounded(1.25, cells, board, SMOOTH)]);
+        let mut flow = SurfaceFlow::at_rest(
+            grid.unwrap(),
+            below(columns, cells, h, |_| 1.0),
+            grains(0.04),
+            [slope.sin(), -slope.cos()],
+            precise(1.0),
+        )
+        .unwrap();
+        for _ in 0..4 {
+            flow.accelerate_in_place(0.25).unwrap();
+        }
+        let [worst, on_wall] = misses_of_stress(&flow, friction * slope.cos());
+        assert!(
+            worst < 1e-3 && on_wall < 1e-3,
+            "{columns}: {worst} {on_wall}"
+        );
+    }
+}

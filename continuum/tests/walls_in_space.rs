@@ -1,10 +1,11 @@
 //! Walls along which material slides, in space: a slab on a floor and between side walls, and the collapse of a
 //! column in a channel beside the plane solver.
+use colluvium_continuum::Error;
 use colluvium_continuum::channel_collapse::{ChannelCase, ChannelCollapse};
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
 use colluvium_continuum::free_surface::{Contact, SpaceFlow, SurfaceOptions};
 use colluvium_continuum::grid::{Axis, Boundary, Grid};
-use colluvium_continuum::rheology::MuI;
+use colluvium_continuum::rheology::{Coulomb, MuI};
 use colluvium_continuum::wall_friction::{SideWalls, WallFriction};
 
 const SMOOTH: Boundary = Boundary::FreeSlip;
@@ -53,6 +54,124 @@ fn slab(x: Axis, y: Axis, floor: Boundary, gravity: [f64; 3]) -> SpaceFlow<MuI> 
         precise(),
     )
     .unwrap()
+}
+
+/// A floor that moves along x shears what lies on it along x and not along y.
+#[test]
+fn a_moving_floor_shears_along_its_own_axis() {
+    let floor = Boundary::NoSlip { velocity: 1.0 };
+    let flow = slab(periodic(0.6), periodic(0.6), floor, [0.0, 0.0, -1.0]);
+    let fields = flow.cell_fields();
+    let rate = 1.0 / (1.5 * (fields[0].upper[2] - fields[0].lower[2]));
+    assert!((fields[0].strain_rate / rate - 1.0).abs() < 1e-12);
+}
+
+/// Matter that bears a given stress and nothing more flows as a block between upright rough walls, which hold it where they
+/// touch it: a = g − 2 c/W, however full its highest cells are.
+#[test]
+fn upright_rough_walls_hold_what_touches_them() {
+    let (cohesion, pull, depth) = (0.05, 0.5, 0.5);
+    let law = Coulomb {
+        mu: 0.0,
+        cohesion,
+        viscosity: 0.0,
+        density: 1.0,
+    };
+    let rough = Boundary::NoSlip { velocity: 0.0 };
+    for fill in [0.3, 0.6, 0.9] {
+        let h = depth / (2.0 + fill);
+        let grid = Grid::with_moving_surface([
+            periodic(0.6),
+            bounded(1.0, 4, rough, rough),
+            bounded(4.0 * h, 4, SMOOTH, SMOOTH),
+        ]);
+        let layers = [1.0, 1.0, fill, 0.0].into_iter();
+        let mut flow = SpaceFlow::in_space(
+            grid.unwrap(),
+            layers.flat_map(|f| [f; 12]).collect(),
+            law,
+            [pull, 0.0, -1.0],
+            precise(),
+        )
+        .unwrap();
+        flow.accelerate_in_place(0.5).unwrap();
+        let found = flow.momentum()[0] / (0.5 * flow.volume());
+        let exact = pull - 2.0 * cohesion;
+        assert!(
+            (found / exact - 1.0).abs() < 1e-3,
+            "{fill}: {found} {exact}"
+        );
+    }
+}
+
+/// All constructors begin with the weight of what stands on the floor, and refuse what cannot be matter within a grid.
+#[test]
+fn matter_begins_under_its_weight_and_within_range() {
+    let floor = Boundary::NoSlip { velocity: 0.0 };
+    let flow = slab(periodic(0.6), periodic(0.6), floor, [0.0, 0.0, -1.0]);
+    let h = 1.25 / 6.0;
+    assert!((flow.state().pressure[0] - (1.0 - 0.5 * h)).abs() < 1e-12);
+
+    let make = |fractions: Vec<f64>, top: Boundary| {
+        let z = bounded(1.0, 3, floor, top);
+        let grid = Grid::with_moving_surface([periodic(1.0), Axis::Flat, z]).unwrap();
+        let law = MuI::new(0.5, 0.7, 0.4, 0.04, 1.0, 1.0);
+        SpaceFlow::in_space(grid, fractions, law, [0.0, 0.0, -1.0], precise())
+    };
+    let loaded = Boundary::LoadedWall {
+        velocity: 0.0,
+        pressure: 1.0,
+    };
+    for top in [Boundary::FreeSurface, loaded] {
+        let refused = make(vec![0.5; 9], top).err();
+        assert!(matches!(
+            refused,
+            Some(Error::OutOfRange {
+                key: "grid.boundary",
+                ..
+            })
+        ));
+    }
+    assert!(matches!(
+        make(vec![0.5; 8], SMOOTH).err(),
+        Some(Error::ForeignState { .. })
+    ));
+    for value in [-1e-18, 1.1, f64::NAN] {
+        let refused = make([vec![value], vec![0.5; 8]].concat(), SMOOTH).err();
+        assert!(matches!(
+            refused,
+            Some(Error::OutOfRange {
+                key: "state.fractions",
+                ..
+            })
+        ));
+    }
+    // What transport leaves behind is no reason to stop.
+    let mut flow = make(vec![0.5; 9], SMOOTH).unwrap();
+    let mut state = flow.state().clone();
+    state.fractions[8] = -1e-18;
+    flow.set_state(state.clone()).unwrap();
+    flow.step(0.01).unwrap();
+    state.fractions[8] = f64::NAN;
+    assert!(flow.set_state(state).is_err());
+}
+
+/// A tolerance of nothing, or none, is refused where a flow is set up.
+#[test]
+fn tolerances_are_positive() {
+    let spoil: [fn(&mut SurfaceOptions, f64); 4] = [
+        |o, value| o.solver.momentum_tolerance = value,
+        |o, value| o.solver.divergence_tolerance = value,
+        |o, value| o.solver.stress_tolerance = value,
+        |o, value| o.solver.tolerance_in_motion = value,
+    ];
+    for spoil in spoil {
+        for value in [0.0, -1.0, f64::NAN, f64::INFINITY] {
+            let mut options = SurfaceOptions::default();
+            spoil(&mut options, value);
+            assert!(options.validate().is_err(), "{value}");
+        }
+    }
 }
 
 /// Gravity on a slope that falls along a direction between x and y.

@@ -5,7 +5,7 @@ use super::topology::NONE;
 use crate::discretisation::COMPONENTS;
 use crate::grid::{Axis, Boundary, DIMENSIONS, unflatten};
 use crate::rheology::{Rheology, strain_rate_norm};
-use crate::strain::{shear_row, stretching};
+use crate::strain::{middle_stretching, shear_row, stretching};
 use crate::units::Units;
 
 /// Matter is rigid where it shears no faster than so many times the strain-rate floor ε.
@@ -26,14 +26,15 @@ pub struct CellFields<const D: usize = DIMENSIONS, const C: usize = COMPONENTS> 
     pub velocity: [f64; D],
     /// Pressure; 0 in cells that have none of their own (less than half full).
     pub pressure: f64,
-    /// ((σ_xx − σ_zz)/2, σ_xz), or the five components of [`crate::strain`], positive in tension, the mean
-    /// over the filled part.
+    /// ((σ_xx − σ_zz)/2, σ_xz), or the five components of [`crate::strain`], positive in tension:
+    /// [`SurfaceFlow::mean_stress`].
     pub stress: [f64; C],
     /// γ̇ = √(2 D:D), by central differences.
     pub strain_rate: f64,
     /// Whether it flows: γ̇ above ten times the strain-rate floor.
     pub flows: bool,
-    /// Whether the equations of motion are well posed here; true where nothing flows.
+    /// Whether the equations of motion are well posed here, by the strain rate in all directions; true where nothing
+    /// flows and where a cell has no pressure, of which nothing can be said.
     pub well_posed: bool,
 }
 
@@ -51,7 +52,7 @@ impl<const D: usize, const C: usize> CellFields<D, C> {
 }
 
 /// Shares of the material's volume in cells of one size: that flows, and that flows where the equations of motion are
-/// ill posed, C(I) > 0.
+/// ill posed ([`crate::rheology::Threshold::is_well_posed`]); cells without a pressure are not among the latter.
 pub fn flowing_shares<const D: usize, const C: usize>(cells: &[CellFields<D, C>]) -> [f64; 2] {
     let (mut flows, mut ill_posed, mut whole) = (0.0, 0.0, 0.0);
     for cell in cells {
@@ -69,9 +70,10 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         let spacing = grid.axes().map(|axis| axis.spacing());
         let (state, (topology, rheology, floor)) = (self.state(), self.parts());
         let filled = |cell: usize| state.fractions[cell] > EMPTY;
+        // A flat axis has one face for each cell.
         let faces = |cell: usize, axis: usize| {
             topology.cell_faces[cell][axis].map(|face| match face {
-                NONE => 0.0,
+                NONE => state.velocity[axis][cell],
                 face => state.velocity[axis][face],
             })
         };
@@ -91,7 +93,11 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                 let mut ends = [(own[component], 0.0); 2];
                 for ((end, &next), wall) in ends.iter_mut().zip(&neighbours).zip(walls) {
                     match (next, wall) {
-                        (NONE, Some(Boundary::NoSlip { velocity })) => *end = (velocity, 0.5),
+                        (NONE, Some(Boundary::NoSlip { velocity })) => {
+                            // A wall moves along the first of its axes.
+                            let moves = component == usize::from(axis == 0);
+                            *end = (if moves { velocity } else { 0.0 }, 0.5);
+                        }
                         (NONE, _) => {}
                         (next, _) if filled(next) => *end = (velocity(next)[component], 1.0),
                         _ => {}
@@ -118,7 +124,6 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             let strain_rate = strain_rate_norm(rate);
             let pressure = state.pressure[cell].max(0.0);
             let flows = strain_rate > RIGID * floor;
-            let points = self.stresses_in(cell);
             let index = unflatten(cell, grid.cell_counts());
             fields.push(CellFields {
                 lower: std::array::from_fn(|axis| index[axis] as f64 * spacing[axis]),
@@ -126,14 +131,16 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                 fraction: state.fractions[cell],
                 velocity: own,
                 pressure,
-                stress: std::array::from_fn(|k| {
-                    points.iter().map(|s| s[k]).sum::<f64>() / points.len() as f64
-                }),
+                stress: self.mean_stress(cell),
                 strain_rate,
                 flows,
                 well_posed: !flows
                     || pressure <= 0.0
-                    || rheology.is_well_posed(strain_rate, pressure),
+                    || rheology.is_well_posed_in_space(
+                        strain_rate,
+                        pressure,
+                        middle_stretching(&rate),
+                    ),
             });
         }
         fields

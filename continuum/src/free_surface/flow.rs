@@ -7,6 +7,7 @@
 
 mod accelerate;
 mod history;
+mod mean_stress;
 mod setup;
 mod state;
 
@@ -37,6 +38,9 @@ const LONGEST_PASS: f64 = 0.5;
 const LEAST_PUSH: f64 = 0.5;
 /// A cell of larger divergence has let go.
 const DILATES: f64 = 1e-6;
+/// Fractions of states from outside: transport leaves them within round-off of [0, 1], but for cells over ground that hold
+/// too much for a step.
+const FRACTIONS: [f64; 2] = [-1e-6, 2.0];
 /// Stands for the pressure of cells that have none.
 const INACTIVE: f64 = -1.0;
 /// Most times that a step is halved.
@@ -120,7 +124,8 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
     /// Goes on from another state of the same grid.
     ///
     /// # Errors
-    /// [`Error::ForeignState`] if the state belongs to another grid.
+    /// [`Error::ForeignState`] if the state belongs to another grid, [`Error::OutOfRange`] for fractions that no
+    /// flow comes to.
     pub fn set_state(&mut self, state: SurfaceState<D, C>) -> Result<(), Error> {
         let cells = self.topology.cells();
         let fits = state.fractions.len() == cells
@@ -136,6 +141,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                 expected: cells,
             });
         }
+        setup::check_fractions(&state.fractions, cells, FRACTIONS)?;
         self.state = state;
         Ok(())
     }

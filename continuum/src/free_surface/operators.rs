@@ -69,7 +69,7 @@ pub(crate) struct Material<'a, const D: usize = DIMENSIONS, const C: usize = COM
     pub outside: Option<&'a Outside<D, C>>,
     /// Where the tractions of walls are kept along which material slides.
     pub sliding: &'a SlidingPlaces<D>,
-    /// Whether its friction is at least 1, so that a free upright face stands.
+    /// Whether its friction holds a free upright face ([`super::standing`]).
     pub stands: bool,
 }
 
@@ -242,7 +242,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             }
             let filled = || volume_in(self.fractions[cell], self.planes[cell].as_ref(), low, high);
             if (0..D).any(|axis| self.slides(axis, at)) {
-                self.add_sliding(cell, index, side, [filled(), share], points, places);
+                self.add_sliding(cell, side, [filled(), share], points, places);
             }
             // No thin layer ends at an open end: what crosses it is given, or moves with the column before it.
             let layer = match self.is_open(at[0]) {
@@ -350,7 +350,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
     fn sticks(&self, axis: usize, corner: [usize; D]) -> bool {
         matches!(
             self.grid.axes()[axis].boundary_at(corner[axis]),
-            Some(Boundary::NoSlip { .. } | Boundary::LoadedWall { .. })
+            Some(Boundary::NoSlip { .. })
         )
     }
 
@@ -364,11 +364,15 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         if sticks { 0.5 } else { 1.0 }
     }
 
-    /// At a corner on a rough wall the traction acts on the whole face, however thin the layer:
+    /// At a corner on a rough wall that carries material the traction acts on the whole face, however thin the layer:
     /// the factor by which the points there count, so that they do as long as one of the cells
-    /// holds material.
+    /// holds material. On other walls it acts where material touches them.
     fn wall_share(&self, corner: [usize; D]) -> Option<f64> {
-        if !(0..D).any(|axis| self.sticks(axis, corner)) {
+        let carries = |axis: usize| {
+            let side = usize::from(corner[axis] > 0);
+            self.sticks(axis, corner) && weight_onto(&self.acceleration, axis, side) > 0.0
+        };
+        if !(0..D).any(carries) {
             return None;
         }
         let (mut all, mut filled) = (0, 0);
@@ -453,7 +457,8 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
     /// On a free surface p is the stress across it, σ_nn = s_nn − p = 0, and |s| ≤ μ p leaves nothing but p = 0 where
     /// μ < 1. With μ ≥ 1 the upright face of a column that stands bears p = s = ρ g z/2, the same on the face as behind
     /// it, so there the pressure goes on across faces along gravity as it is: through p = 0 the last cells behind the face
-    /// would bear no more than half of it, and corners stand with μ ≥ 2 only.
+    /// would bear no more than half of it, and corners stand with μ ≥ 2 only. In space a corner needs more than μ = 1, and
+    /// so do all faces here ([`super::standing`]).
     fn extrapolated(
         &self,
         cell: usize,

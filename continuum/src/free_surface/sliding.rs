@@ -11,7 +11,7 @@ use super::ground::contact::sliding_place;
 use super::operators::{EMPTY, Material, points_of};
 use super::topology::NONE;
 use crate::discretisation::QuadraturePoint;
-use crate::grid::{Boundary, Grid, flatten};
+use crate::grid::{Boundary, Grid, flatten, unflatten};
 use crate::strain::shear_row;
 use crate::wall_friction::{PointLaw, WallFriction};
 
@@ -67,6 +67,29 @@ impl<const D: usize> SlidingPlaces<D> {
 }
 
 impl<const D: usize> SlidingPlaces<D> {
+    /// Where the traction of the wall across an axis is kept at a corner of a cell on these sides of it, if there is a
+    /// wall along which material slides.
+    pub(super) fn at_corner(
+        &self,
+        grid: &Grid<D>,
+        axis: usize,
+        cell: usize,
+        side: [usize; D],
+    ) -> Option<usize> {
+        let first = self.first[axis][side[axis]];
+        let index = unflatten(cell, grid.cell_counts());
+        let edge = index[axis] + side[axis];
+        if first == NONE || (edge != 0 && edge != grid.axes()[axis].cells()) {
+            return None;
+        }
+        let strip = |mut numbers: [usize; D], mut counts: [usize; D]| {
+            (numbers[axis], counts[axis]) = (0, 1);
+            flatten(numbers, counts)
+        };
+        let cells_before = strip(index, grid.cell_counts()) * points_of(D - 1);
+        Some(first + cells_before + strip(side, [2; D]))
+    }
+
     /// Where the traction of the ground in a cell is kept, on a grid of so many cells.
     pub(super) fn on_ground(&self, cells: usize, cell: usize) -> usize {
         if D == 2 {
@@ -98,7 +121,6 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
     pub(super) fn add_sliding<const V: usize>(
         &self,
         cell: usize,
-        index: [usize; D],
         side: [usize; D],
         [filled, whole]: [f64; 2],
         points: &mut Vec<QuadraturePoint<C, V>>,
@@ -106,15 +128,12 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
     ) {
         let axes = self.grid.axes();
         for axis in 0..D {
-            let edge = index[axis] + side[axis];
-            let on_edge = edge == 0 || edge == axes[axis].cells();
-            let first = self.sliding.first[axis][side[axis]];
+            let Some(place) = self.sliding.at_corner(self.grid, axis, cell, side) else {
+                continue;
+            };
             let Some((friction, velocity)) = friction_of(self.grid, axis, side[axis]) else {
                 continue;
             };
-            if !on_edge || first == NONE {
-                continue;
-            }
             let carries = weight_onto(&self.acceleration, axis, side[axis]) > 0.0;
             let share = if carries { whole } else { filled };
             if share <= 0.0 || self.fractions[cell] <= EMPTY {
@@ -146,18 +165,9 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             if point.velocities().is_empty() {
                 continue;
             }
-            let strip = |numbers: [usize; D], counts: [usize; D]| {
-                let (mut numbers, mut counts) = (numbers, counts);
-                (numbers[axis], counts[axis]) = (0, 1);
-                flatten(numbers, counts)
-            };
             point.side = (axis == D - 1).then_some(side[axis]);
             points.push(point);
-            places.push(
-                first
-                    + strip(index, self.grid.cell_counts()) * points_of(D - 1)
-                    + strip(side, [2; D]),
-            );
+            places.push(place);
         }
     }
 }

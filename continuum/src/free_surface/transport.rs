@@ -228,7 +228,7 @@ impl<const D: usize> Transport<D> {
             let (donor, through) = (motion.topology.face_cells[0][last][0], length(last));
             let (from, to) = ([1.0 - through, 0.0, 0.0], [1.0; 3]);
             let volume = volume_in(fractions[donor], self.planes[donor].as_ref(), from, to);
-            self.fluxes[last] = volume.clamp(0.0, fractions[donor]);
+            self.fluxes[last] = volume.clamp(0.0, fractions[donor].max(0.0));
             self.passed[0] += self.fluxes[first];
             self.passed[1] += self.fluxes[last];
         }
@@ -289,7 +289,7 @@ impl<const D: usize> Transport<D> {
                             high
                         };
                         let volume = volume_in(fractions[donor], planes[donor].as_ref(), from, to);
-                        volume.clamp(0.0, fractions[donor]) * length.signum()
+                        volume.clamp(0.0, fractions[donor].max(0.0)) * length.signum()
                     }),
             );
     }

@@ -162,7 +162,7 @@ impl QuasiDefinite {
                     Default::default(),
                 )
                 .map(|_| ())
-                .map_err(|e| Error::LinearSolver(format!("{e:?}"))),
+                .map_err(|e| Error::Singular(format!("{e:?}"))),
             Kind::Loose(loose) => {
                 let Loose {
                     symbolic,

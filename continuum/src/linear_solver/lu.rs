@@ -1,6 +1,7 @@
 //! LU factors with partial pivoting and reused symbolic analysis.
 
 use faer::dyn_stack::{MemBuffer, MemStack};
+use faer::sparse::linalg::LuError;
 use faer::sparse::linalg::lu::{LuRef, NumericLu, SymbolicLu, factorize_symbolic_lu};
 use faer::sparse::{SparseColMatRef, SymbolicSparseColMatRef};
 use faer::{Conj, MatMut, Par};
@@ -43,8 +44,11 @@ impl Lu {
                 MemStack::new(&mut self.scratch),
                 Default::default(),
             )
-            .map_err(|e| Error::LinearSolver(format!("{e:?}")))?;
-        Ok(())
+            .map(|_| ())
+            .map_err(|e| match e {
+                LuError::SymbolicSingular { .. } => Error::Singular(format!("{e:?}")),
+                LuError::Generic(e) => Error::LinearSolver(format!("{e:?}")),
+            })
     }
 
     /// Overwrites x with A⁻¹ x; there must be factors.

@@ -28,7 +28,7 @@ use super::coefficients::StepMatrix;
 use super::conflict::Conflicts;
 use super::{FlowState, Residuals, StepProblem, StepReport, YieldSolver};
 use crate::discretisation::{COMPONENTS, Discretisation};
-use crate::error::Error;
+use crate::error::{Error, is_solved};
 use crate::rheology::Rheology;
 use crate::threads;
 use evaluation::Evaluation;
@@ -174,7 +174,7 @@ impl<const C: usize> PrimalDual<C> {
         strategy: &Strategy,
         given: Option<&Residuals>,
         report: &mut StepReport,
-    ) {
+    ) -> Result<(), Error> {
         self.trial.clone_from(start);
         self.conflicts.begin();
         self.evaluated_at = f64::NAN;
@@ -212,9 +212,9 @@ impl<const C: usize> PrimalDual<C> {
             };
             floor_of_factors = floor;
             let Some(fraction) =
-                threads::with_help(pays, || self.iterate(problem, u_old, &this, report))
+                threads::with_help(pays, || self.iterate(problem, u_old, &this, report))?
             else {
-                return;
+                return Ok(());
             };
             let is_last_floor = floor <= self.options.strain_rate_floor;
             let mut allowed = given.copied().unwrap_or_else(|| self.tolerances(problem));
@@ -229,7 +229,7 @@ impl<const C: usize> PrimalDual<C> {
                     break;
                 }
                 let clock = Instant::now();
-                let outcome = self.solve_part(problem, u_old, &allowed, report);
+                let outcome = self.solve_part(problem, u_old, &allowed, report)?;
                 self.times.parts += clock.elapsed().as_secs_f64();
                 if outcome == Outcome::TooLarge {
                     break;
@@ -247,9 +247,10 @@ impl<const C: usize> PrimalDual<C> {
             if keeps {
                 tolerance = self.forcing(&allowed, &report.residuals);
             }
+            report.allowed = allowed;
             if is_last_floor && report.residuals.are_within(&allowed) {
                 report.converged = true;
-                return;
+                return Ok(());
             }
             let left = report.residuals.over(&allowed);
             let left = left.max(report.residuals.divergence / allowed.divergence);
@@ -262,7 +263,7 @@ impl<const C: usize> PrimalDual<C> {
                 // nor is what changes while the rest converges.
                 let converges = left <= PROGRESS * left_when_counting;
                 if !converges {
-                    return;
+                    return Ok(());
                 }
                 left_when_counting = left;
                 self.conflicts.begin();
@@ -271,6 +272,7 @@ impl<const C: usize> PrimalDual<C> {
                 floor = (floor * strategy.factor).max(self.options.strain_rate_floor);
             }
         }
+        Ok(())
     }
 
     /// One iteration of the whole: the part of the change that was made, or none if there was no linear solution.
@@ -280,7 +282,7 @@ impl<const C: usize> PrimalDual<C> {
         u_old: &[f64],
         this: &Iteration,
         report: &mut StepReport,
-    ) -> Option<f64> {
+    ) -> Result<Option<f64>, Error> {
         self.release(problem.discretisation, this.is_first);
         self.linearise(problem, this.floor);
         self.assemble(problem, u_old);
@@ -296,7 +298,9 @@ impl<const C: usize> PrimalDual<C> {
         let factors = system.take_factor_time();
         self.times.factors += factors;
         self.times.krylov += clock.elapsed().as_secs_f64() - factors;
-        solved.ok()?;
+        if !is_solved(solved)? {
+            return Ok(None);
+        }
         let fraction = if this.line_search {
             self.line_search(problem, u_old, this.floor)
         } else {
@@ -304,7 +308,7 @@ impl<const C: usize> PrimalDual<C> {
         };
         self.update(problem, this.floor, fraction);
         report.residuals = self.residuals(problem, u_old, this.floor);
-        Some(fraction)
+        Ok(Some(fraction))
     }
 
     /// Relative residual to which the next linear system is solved: a part of what is left of the way, by which the
@@ -360,7 +364,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> YieldSolver<R,
         self.conflicts.forget();
         for round in 0..=MOST_HELD_ROUNDS {
             for strategy in &strategies[usize::from(is_cold)..] {
-                self.attempt(problem, &state.u, state, strategy, None, &mut report);
+                self.attempt(problem, &state.u, state, strategy, None, &mut report)?;
                 if report.converged {
                     state.clone_from(&self.trial);
                     report.held_points = self.conflicts.held();

@@ -13,7 +13,7 @@ use super::{
     largest_or_nan, momentum_residual, threshold_pressure,
 };
 use crate::discretisation::{COMPONENTS, Discretisation};
-use crate::error::{Error, require};
+use crate::error::{Error, is_solved, require};
 use crate::rheology::{Rheology, strain_rate_norm};
 
 /// Settings of [`RegularisedViscosity`].
@@ -157,7 +157,7 @@ impl<R: Rheology> YieldSolver<R> for RegularisedViscosity {
                     .system
                     .solve(&self.right_hand_side, &mut self.change, LINEAR_TOLERANCE)
             });
-            if solved.is_err() {
+            if !is_solved(solved)? {
                 return Ok(report);
             }
             let (du, dp) = self.change.split_at(velocities);

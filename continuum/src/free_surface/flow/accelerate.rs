@@ -10,6 +10,7 @@ use crate::free_surface::ground::faces::faces_over;
 use crate::free_surface::ground::shores::Motion;
 use crate::free_surface::operators::{Material, Operators};
 use crate::free_surface::sliding::some_wall_adheres;
+use crate::free_surface::standing;
 use crate::free_surface::transport::MASSLESS;
 use crate::rheology::Rheology;
 use crate::yield_step::{PrimalDual, Residuals, StepProblem, YieldSolver};
@@ -88,6 +89,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             self.spent.operators += clock.elapsed().as_secs_f64();
             record.active_cells = faces.active.len();
             record.residuals = Residuals::default();
+            record.allowed = Residuals::default();
             self.state.history.forget_stress();
             self.scatter(&faces, &places, dt);
             return Ok(true);
@@ -129,6 +131,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         self.spent.within_newton.add(&solver.take_times());
         record.newton_iterations += report.iterations;
         record.residuals = report.residuals;
+        record.allowed = report.allowed;
         record.held_points = report.held_points;
         if report.converged {
             if let Some(outside) = &self.outside {
@@ -146,10 +149,10 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         Ok(report.converged)
     }
 
-    /// Whether the friction of matter at rest is at least 1.
+    /// Whether the friction of matter at rest holds free upright faces.
     fn stands(&self) -> bool {
         let [one, two] = [1.0, 2.0].map(|p| self.rheology.threshold(0.0, p).stress);
-        two - one >= 1.0
+        two - one >= standing::friction(standing::free_axes(&self.grid)).max(1.0)
     }
 
     /// Without pressure and stress, and if gravity alone lets no cell shrink, free fall is the exact

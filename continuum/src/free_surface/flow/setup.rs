@@ -7,8 +7,9 @@ use crate::error::{Error, require};
 use crate::free_surface::ground::shores::Shores;
 use crate::free_surface::ground::{Ground, Terrain};
 use crate::free_surface::open_ends::{Inflow, OpenEnds, can_open};
-use crate::free_surface::operators::POINTS;
+use crate::free_surface::operators::{POINTS, points_of};
 use crate::free_surface::sliding::SlidingPlaces;
+use crate::free_surface::standing;
 use crate::free_surface::topology::{NONE, Topology};
 use crate::free_surface::transport::Transport;
 use crate::grid::{Boundary, DIMENSIONS, Grid};
@@ -19,6 +20,26 @@ use crate::yield_step::FlowState;
 
 /// Cells over ground that miss less of being full count as full.
 const FULL_TO: f64 = 1e-11;
+
+/// Refuses fractions of another number of cells, or out of range.
+pub(super) fn check_fractions(
+    fractions: &[f64],
+    cells: usize,
+    [least, most]: [f64; 2],
+) -> Result<(), Error> {
+    if fractions.len() != cells {
+        return Err(Error::ForeignState {
+            found: fractions.len(),
+            expected: cells,
+        });
+    }
+    let allowed = format!("finite and {least} to {most}: the filled part of a cell");
+    for fraction in fractions {
+        let holds = (least..=most).contains(fraction);
+        require(holds, "state.fractions", *fraction, allowed.as_str())?;
+    }
+    Ok(())
+}
 
 impl<R: Rheology> SurfaceFlow<R> {
     /// Material at rest that fills the given fraction of each cell of a plane grid, x fastest. What stands on the
@@ -34,28 +55,7 @@ impl<R: Rheology> SurfaceFlow<R> {
         acceleration: [f64; DIMENSIONS],
         options: SurfaceOptions,
     ) -> Result<Self, Error> {
-        let mut flow = Self::filling(grid, fractions, rheology, acceleration, options)?;
-        flow.set_weight_for_pressure();
-        flow.take_weight_from_what_hangs();
-        flow.stand_upright();
-        flow.saved.clone_from(&flow.state);
-        Ok(flow)
-    }
-
-    /// Where friction lets columns bear their weight with no stress across them, they begin so: σ_zz = −2 p = −w,
-    /// |τ| = p. Where walls or other
-    /// matter lean on them the first step finds what holds there.
-    fn stand_upright(&mut self) {
-        let floor = self.options.solver.strain_rate_floor;
-        for (cell, weight) in self.state.pressure.iter_mut().enumerate() {
-            let p = 0.5 * *weight;
-            if p > 0.0 && self.rheology.threshold(floor, p).stress > p {
-                *weight = p;
-                for stress in &mut self.state.stress[cell * POINTS..][..POINTS] {
-                    *stress = [p, 0.0];
-                }
-            }
-        }
+        Self::on_floor(grid, fractions, rheology, acceleration, options)
     }
 
     /// The same flow between side walls at a distance along y, in natural units: they rub on what
@@ -76,7 +76,7 @@ impl<R: Rheology> SurfaceFlow<R> {
 
 impl<R: Rheology> SpaceFlow<R> {
     /// Material at rest that fills the given fraction of each cell of a grid in space, x fastest and z
-    /// slowest.
+    /// slowest. What stands on the floor begins under its own weight.
     ///
     /// # Errors
     /// Settings out of range.
@@ -87,7 +87,7 @@ impl<R: Rheology> SpaceFlow<R> {
         acceleration: [f64; 3],
         options: SurfaceOptions,
     ) -> Result<Self, Error> {
-        Self::filling(grid, fractions, rheology, acceleration, options)
+        Self::on_floor(grid, fractions, rheology, acceleration, options)
     }
 }
 
@@ -153,7 +153,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         let topology = Topology::rising(&grid, terrain.rise);
         let ground = Ground::new(&grid, &topology, terrain)?;
         if ground.lies_below() && floor == Some(terrain.contact.on_wall()) {
-            return Self::filling(grid, fractions, rheology, acceleration, options);
+            return Self::on_floor(grid, fractions, rheology, acceleration, options);
         }
         for axis in grid.axes() {
             for face in [0, axis.cells()] {
@@ -182,9 +182,26 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         let places = flow.sliding.of_layer(cells, 0, cells);
         flow.state.stress.resize(places, [0.0; C]);
         flow.topology = topology;
+        // What lies on ground reaches the lower edge of the grid nowhere: nothing is asked whether it hangs.
         flow.set_weight_for_pressure();
+        flow.stand_upright();
         flow.saved.clone_from(&flow.state);
         flow.bed = Some(ground);
+        Ok(flow)
+    }
+
+    fn on_floor(
+        grid: Grid<D>,
+        fractions: Vec<f64>,
+        rheology: R,
+        acceleration: [f64; D],
+        options: SurfaceOptions,
+    ) -> Result<Self, Error> {
+        let mut flow = Self::filling(grid, fractions, rheology, acceleration, options)?;
+        flow.set_weight_for_pressure();
+        flow.take_weight_from_what_hangs();
+        flow.stand_upright();
+        flow.saved.clone_from(&flow.state);
         Ok(flow)
     }
 
@@ -198,12 +215,19 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         options.validate()?;
         for axis in grid.axes() {
             for face in [0, axis.cells()] {
-                if let Some(Boundary::CoulombWall { friction, .. }) = axis.boundary_at(face) {
-                    friction.validate()?;
+                match axis.boundary_at(face) {
+                    Some(Boundary::CoulombWall { friction, .. }) => friction.validate()?,
+                    wall => require(
+                        !wall.is_some_and(|wall| wall.outer_pressure().is_some()),
+                        "grid.boundary",
+                        face as f64,
+                        "walls that stay where they are: the surface moves within the grid",
+                    )?,
                 }
             }
         }
         let topology = Topology::new(&grid);
+        check_fractions(&fractions, topology.cells(), [0.0, 1.0 + FULL_TO])?;
         let sliding = SlidingPlaces::new(&grid);
         let state = SurfaceState {
             velocity: std::array::from_fn(|c| vec![0.0; topology.faces(c)]),
@@ -263,6 +287,27 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                     _ => 0.0,
                 };
                 self.state.pressure[cell] = load + 0.5 * per_cell * fractions[cell];
+            }
+        }
+    }
+
+    /// Where friction lets columns bear their weight with nothing on their upright faces, they begin so ([`standing`]).
+    /// Where walls or other
+    /// matter lean on them the first step finds what holds there.
+    fn stand_upright(&mut self) {
+        let free = standing::free_axes(&self.grid);
+        if free == 0 {
+            return;
+        }
+        let floor = self.options.solver.strain_rate_floor;
+        let (share, stress) = standing::stress::<D, C>(&self.grid);
+        let points = points_of(D);
+        for (cell, weight) in self.state.pressure.iter_mut().enumerate() {
+            let p = share * *weight;
+            let bears = || self.rheology.threshold(floor, p).stress > standing::friction(free) * p;
+            if p > 0.0 && bears() {
+                *weight = p;
+                self.state.stress[cell * points..][..points].fill(stress.map(|s| s * p));
             }
         }
     }

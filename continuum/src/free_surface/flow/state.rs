@@ -89,7 +89,8 @@ impl SurfaceOptions {
             "solver.growth",
             self.growth,
             "greater than 1 and finite",
-        )
+        )?;
+        self.solver.validate()
     }
 }
 
@@ -110,6 +111,8 @@ pub struct SurfaceStep {
     pub held_points: usize,
     /// Residuals of the equations.
     pub residuals: Residuals,
+    /// What they were allowed to be ([`crate::yield_step::StepReport::allowed`]).
+    pub allowed: Residuals,
     /// Largest speed of material.
     pub max_speed: f64,
 }

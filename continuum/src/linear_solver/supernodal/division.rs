@@ -46,7 +46,7 @@ pub(super) fn divide(
     if width == 1 {
         let sign = f64::from(signs[0]);
         if !own[0].is_finite() {
-            return Err(Error::LinearSolver("a pivot is not finite".into()));
+            return Err(Error::Singular("a pivot is not finite".into()));
         }
         if own[0] * sign <= SMALLEST_PIVOT {
             own[0] = sign * SMALLEST_PIVOT;
@@ -105,7 +105,7 @@ fn divide_block(
         MemStack::new(&mut strand.scratch),
         Default::default(),
     )
-    .map_err(|e| Error::LinearSolver(format!("{e:?}")))?;
+    .map_err(|e| Error::Singular(format!("{e:?}")))?;
     solve_unit_lower_triangular_in_place(top.rb(), below.rb_mut().transpose_mut(), Par::Seq);
     for j in 0..width {
         let by = 1.0 / top[(j, j)];

@@ -78,7 +78,7 @@ const SMALLEST_STRAIN_RATE_FLOOR: f64 = 1e-7;
 
 impl PrimalDualOptions {
     /// Refuses numbers with which the method means nothing.
-    pub(super) fn validate(&self) -> Result<(), Error> {
+    pub(crate) fn validate(&self) -> Result<(), Error> {
         require(
             self.strain_rate_floor >= SMALLEST_STRAIN_RATE_FLOOR
                 && self.strain_rate_floor <= self.first_strain_rate_floor,
@@ -89,6 +89,18 @@ impl PrimalDualOptions {
                 self.first_strain_rate_floor
             ),
         )?;
+        for (key, value) in [
+            ("solver.momentum_tolerance", self.momentum_tolerance),
+            ("solver.divergence_tolerance", self.divergence_tolerance),
+            ("solver.stress_tolerance", self.stress_tolerance),
+            ("solver.tolerance_in_motion", self.tolerance_in_motion),
+            (
+                "solver.first_strain_rate_floor",
+                self.first_strain_rate_floor,
+            ),
+        ] {
+            require(value > 0.0, key, value, "greater than 0 and finite")?;
+        }
         require(
             self.floor_factor > 0.0 && self.floor_factor < 1.0,
             "solver.floor_factor",

@@ -7,6 +7,7 @@
 
 use super::{PrimalDual, Strategy};
 use crate::discretisation::{Discretisation, Parts};
+use crate::error::Error;
 use crate::rheology::Rheology;
 use crate::yield_step::{FlowState, Residuals, StepProblem, StepReport};
 
@@ -179,7 +180,7 @@ impl<const C: usize> PrimalDual<C> {
         u_old: &[f64],
         allowed: &Residuals,
         report: &mut StepReport,
-    ) -> Outcome {
+    ) -> Result<Outcome, Error> {
         let discretisation = problem.discretisation;
         let found = report.residuals;
         let off = (SHARE_OF_MOMENTUM * found.momentum).max(SHARE_ALLOWED * allowed.momentum);
@@ -193,12 +194,10 @@ impl<const C: usize> PrimalDual<C> {
         }
         let most = (LARGEST_PART * u_old.len() as f64) as usize;
         let Some(part) = Part::around(discretisation, &mut marked, LAYERS, most) else {
-            return Outcome::TooLarge;
+            return Ok(Outcome::TooLarge);
         };
         let (restricted, load) = part.restrict(problem, &self.trial);
-        let Ok(mut solver) = PrimalDual::new(&restricted, self.options) else {
-            return Outcome::Failed;
-        };
+        let mut solver = PrimalDual::new(&restricted, self.options)?;
         let inner = StepProblem {
             discretisation: &restricted,
             rheology: problem.rheology,
@@ -226,7 +225,7 @@ impl<const C: usize> PrimalDual<C> {
                 solves_parts: false,
             };
             let aim = Some(&aim);
-            solver.attempt(&inner, &old, &start, &strategy, aim, &mut inner_report);
+            solver.attempt(&inner, &old, &start, &strategy, aim, &mut inner_report)?;
             if inner_report.converged {
                 break;
             }
@@ -234,9 +233,9 @@ impl<const C: usize> PrimalDual<C> {
         report.part_iterations += inner_report.iterations;
         if inner_report.converged {
             part.scatter(&solver.trial, &mut self.trial);
-            Outcome::Solved
+            Ok(Outcome::Solved)
         } else {
-            Outcome::Failed
+            Ok(Outcome::Failed)
         }
     }
 }
