@@ -112,7 +112,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             let Some((friction, velocity)) = friction_of(self.grid, axis, side[axis]) else {
                 continue;
             };
-            if !on_edge || first == NONE {
+            if !on_edge || first == NONE || self.topology.opens(cell, axis, side[axis]) {
                 continue;
             }
             let carries = weight_onto(&self.acceleration, axis, side[axis]) > 0.0;
