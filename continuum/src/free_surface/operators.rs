@@ -360,7 +360,10 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             self.grid.axes()[axis].boundary_at(corner[axis]),
             Some(Boundary::NoSlip { .. } | Boundary::LoadedWall { .. })
         );
-        sticks && !self.topology.opens(cell, axis, usize::from(corner[axis] > 0))
+        sticks
+            && !self
+                .topology
+                .opens(cell, axis, usize::from(corner[axis] > 0))
     }
 
     /// How much of what a cell stretches, and shears in the plane of a wall, there is in the quarter of it at a
