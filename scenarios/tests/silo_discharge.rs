@@ -35,7 +35,7 @@ fn silos_run_out_at_a_constant_rate() {
         "fluid",
         &[
             "rheology.mu_s=0",
-            "rheology.mu_2=0",
+            "rheology.mu_2=1e-6",
             "walls.contact=free-slip",
             "floor.contact=free-slip",
             "height=0.18",
