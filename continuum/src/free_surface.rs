@@ -17,6 +17,7 @@ mod ground;
 mod layers_on_material;
 mod open_ends;
 mod operators;
+mod outlet;
 mod outside;
 pub mod plane;
 mod sliding;

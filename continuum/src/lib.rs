@@ -58,6 +58,7 @@ pub mod open_chute;
 pub mod plane_shear;
 pub mod plane_wave;
 pub mod rheology;
+pub mod silo;
 pub mod strain;
 pub mod terrain;
 mod threads;

@@ -19,6 +19,7 @@ mod open_ends_in_space;
 mod outside;
 mod sheared_layers;
 mod shores;
+mod silo;
 mod space;
 mod specks;
 mod steep_ground;

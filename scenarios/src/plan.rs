@@ -7,6 +7,7 @@ mod joined_incline;
 mod law;
 mod open_chute;
 mod sheared;
+mod silo_discharge;
 mod world;
 
 use crate::calibrate;
@@ -49,6 +50,7 @@ pub fn plan(scene: &Scene) -> Result<String, Failure> {
             Ok(cylinder::cylinder(body, ground.as_ref()))
         }
         SceneBody::OpenChute(body) => open_chute::open_chute(scene, body),
+        SceneBody::SiloDischarge(body) => silo_discharge::silo_discharge(scene, body),
         SceneBody::Impact(body) => impact(scene, body),
         SceneBody::Chute(body) => bed::chute(body),
         SceneBody::Settle(body) => bed::settle(body),

@@ -36,6 +36,7 @@ pub mod precheck;
 pub mod settle;
 pub mod sheared;
 mod silo;
+pub mod silo_discharge;
 pub mod steady_layer;
 pub mod step;
 mod step_table;
@@ -261,6 +262,7 @@ pub fn check(scene: &Scene) -> Result<(), Failure> {
         SceneBody::Collapse(body) => collapse::check(scene, body),
         SceneBody::Cylinder(body) => cylinder::check(scene, body),
         SceneBody::OpenChute(body) => open_chute::check(scene, body),
+        SceneBody::SiloDischarge(body) => silo_discharge::check(scene, body),
     }
 }
 
@@ -319,6 +321,7 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> {
             SceneBody::Collapse(body) => collapse::run(body, &mut under),
             SceneBody::Cylinder(body) => cylinder::run(body, &mut under),
             SceneBody::OpenChute(body) => open_chute::run(body, &mut under),
+            SceneBody::SiloDischarge(body) => silo_discharge::run(body, &mut under),
         })
     });
     let (begun, wall_s, going_on) = (under.begun, under.wall_s(), under.resumed.is_some());

@@ -45,6 +45,7 @@ mod overlap_width;
 mod settle;
 mod sheared;
 mod silo;
+mod silo_discharge;
 mod tensile;
 mod tumbling_box;
 pub mod world;
@@ -92,6 +93,7 @@ pub use overlap::{InclineModel, NormalMotionKind, OverlapKeys};
 pub use settle::{SettleFloor, SettleGrains, SettleScene};
 pub use sheared::{ExactFlow, ShearedCase, ShearedScene};
 pub use silo::SiloScene;
+pub use silo_discharge::{SiloDischargeScene, SiloGrid};
 pub use tensile::{ClampKind, TensileScene};
 pub use tumbling_box::{Attitude, BedKeys, LanderKeys, TumblingBoxScene};
 

@@ -236,6 +236,16 @@ fn interrupted_open_chute_goes_on_to_the_same_state() {
     });
 }
 
+/// So is what has run out of a silo.
+#[test]
+fn interrupted_silo_goes_on_to_the_same_state() {
+    goes_on_to_the_same_state("run silo-discharge", |out| {
+        let mut list = vec!["run", "silo-discharge", "--out", out];
+        list.extend(["--set", "duration_scaled=4"]);
+        list
+    });
+}
+
 /// The same in space.
 #[test]
 fn interrupted_open_chute_in_space_goes_on_to_the_same_state() {
@@ -281,6 +291,7 @@ fn goes_on_to_the_same_state(begun: &str, arguments: impl Fn(&'static str) -> Ve
     for name in [
         "front.csv",
         "balance.csv",
+        "discharge.csv",
         "profiles.csv",
         "steps.csv",
         "flowing.csv",

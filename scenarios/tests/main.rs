@@ -30,5 +30,6 @@ mod recipes;
 mod restart;
 mod scenes;
 mod sheared;
+mod silo_discharge;
 mod tumbling_box;
 mod worlds;

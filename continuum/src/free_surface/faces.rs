@@ -235,6 +235,13 @@ impl<const D: usize> Faces<D> {
         face: usize,
     ) -> Face {
         let cells = topology.face_cells[component][face];
+        if topology.is_outlet(component, face) {
+            // What an outlet has not enough of for a pressure moves with what is above, or falls.
+            return match self.pressure[face] {
+                NONE => Face::Loose,
+                _ => self.take(component, face, false, NONE),
+            };
+        }
         if cells.contains(&NONE) {
             return Face::Still;
         }
@@ -459,7 +466,10 @@ impl<const D: usize> Faces<D> {
                 let is_floor = (0..D)
                     .filter(|&other| other != component)
                     .all(|other| weight >= self.acceleration[other].abs());
-                ends && rigid && weight > along && is_floor
+                let is_closed = topology.face_cells[component][face]
+                    .into_iter()
+                    .all(|cell| !topology.opens(cell, axis, side));
+                ends && rigid && is_closed && weight > along && is_floor
             })
     }
 
@@ -530,7 +540,9 @@ fn lies_on_wall<const D: usize>(
     (0..2).any(|side| {
         let cell = topology.face_cells[component][face][side];
         let other = topology.face_cells[component][face][1 - side];
-        topology.cell_neighbours[cell][component][side] == NONE && fractions[other] <= empty
+        topology.cell_neighbours[cell][component][side] == NONE
+            && !topology.opens(cell, component, side)
+            && fractions[other] <= empty
     })
 }
 

@@ -87,7 +87,10 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             let shear = |component: usize, axis: usize| {
                 let neighbours = topology.cell_neighbours[cell][axis];
                 let walls = match grid.axes()[axis] {
-                    Axis::Bounded { low, high, .. } => [Some(low), Some(high)],
+                    Axis::Bounded { low, high, .. } => [
+                        Some(low).filter(|_| !topology.opens(cell, axis, 0)),
+                        Some(high),
+                    ],
                     _ => [None, None],
                 };
                 let mut ends = [(own[component], 0.0); 2];

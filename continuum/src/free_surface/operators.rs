@@ -27,6 +27,8 @@ use crate::wall_friction::{PointLaw, SideWalls};
 pub(super) const NEAREST_EXTRAPOLATION: f64 = 0.25;
 /// An axis along which gravity has less than this part of all of it lies across upright faces.
 const UPRIGHT: f64 = 1e-9;
+/// Distance of an outlet from the centres of the cells above it, in cells.
+const TO_OUTLET: f64 = 0.5;
 /// Ways from a cell to those beside it, in space.
 const MOST_WAYS: usize = 6;
 /// Cells with less material have no quadrature points.
@@ -158,7 +160,9 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                     };
                     let outwards = if side == 1 { 1.0 } else { -1.0 };
                     let other = self.topology.cell_neighbours[cell][axis][side];
-                    let distance = if self.faces.pressure[other] == NONE {
+                    let distance = if other == NONE {
+                        TO_OUTLET
+                    } else if self.faces.pressure[other] == NONE {
                         self.surface_distance(cell, other, axis, side)
                     } else {
                         1.0
@@ -170,6 +174,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                     let push = outwards * parts.mass[j] / (distance * spacing);
                     parts.gradient.push(push);
                     if let Some(outside) = self.outside
+                        && other != NONE
                         && self.faces.pressure[other] == NONE
                     {
                         parts.boundary_load[j] -= push * outside.on_surface(cell, other, distance);
@@ -244,12 +249,13 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             if (0..D).any(|axis| self.slides(axis, at)) {
                 self.add_sliding(cell, side, [filled(), share], points, places);
             }
+            let on_outlet = self.topology.opens(cell, D - 1, side[D - 1]);
             // No thin layer ends at an open end: what crosses it is given, or moves with the column before it.
             let layer = match self.is_open(at[0]) {
                 true => None,
                 false => self.under_layer(cell, side, share, filled),
             };
-            let volume = match (&layer, self.wall_share(at)) {
+            let volume = match (&layer, self.wall_share(cell, at)) {
                 (Some(layer), _) => layer.volume,
                 (None, Some(factor)) => factor * share,
                 (None, None) => filled(),
@@ -258,7 +264,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 continue;
             }
             let mut point = QuadraturePoint::new(volume * self.grid.cell_volume());
-            let part = self.part_beside_wall(at);
+            let part = self.part_beside_wall(cell, at);
             for axis in 0..D {
                 for &(row, orientation) in stretching::<D>(axis) {
                     self.add_stretching(cell, axis, row, part * orientation, &mut point);
@@ -266,7 +272,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             }
             for high in 1..D {
                 for low in 0..high {
-                    if self.slides(low, at) || self.slides(high, at) {
+                    if on_outlet || self.slides(low, at) || self.slides(high, at) {
                         continue;
                     }
                     // The edge through the corner: a cell along the other axes.
@@ -281,7 +287,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                         let plane = [low, high];
                         add_corner_shear(self.grid, velocity_at, edge, plane, row, &mut point);
                     }
-                    if part < 1.0 && ![low, high].iter().any(|&axis| self.sticks(axis, at)) {
+                    if part < 1.0 && ![low, high].iter().any(|&axis| self.sticks(cell, axis, at)) {
                         point.scale_rate(row, part);
                     }
                 }
@@ -297,6 +303,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 let last = D - 1;
                 point.side = axes[last]
                     .boundary_at(at[last])
+                    .filter(|_| !on_outlet)
                     .map(|_| usize::from(at[last] > 0));
                 points.push(point);
                 places.push(cell * points_of(D) + corner);
@@ -337,6 +344,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                     .flat_map(|axis| [(axis, 0), (axis, 1)])
                     .find(|&(axis, side)| {
                         self.topology.cell_neighbours[cell][axis][side] == NONE
+                            && !self.topology.opens(cell, axis, side)
                             && weight_onto(&self.acceleration, axis, side) > 0.0
                     })?
             };
@@ -346,12 +354,16 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         (volume > 0.0 && !point.velocities().is_empty()).then_some(point)
     }
 
-    /// Whether a corner lies on a wall across an axis to which material sticks.
-    fn sticks(&self, axis: usize, corner: [usize; D]) -> bool {
-        matches!(
+    /// Whether a cell meets at a corner a wall across an axis to which material sticks.
+    fn sticks(&self, cell: usize, axis: usize, corner: [usize; D]) -> bool {
+        let sticks = matches!(
             self.grid.axes()[axis].boundary_at(corner[axis]),
             Some(Boundary::NoSlip { .. })
-        )
+        );
+        sticks
+            && !self
+                .topology
+                .opens(cell, axis, usize::from(corner[axis] > 0))
     }
 
     /// How much of what a cell stretches, and shears in the plane of a wall, there is in the quarter of it at a
@@ -359,24 +371,27 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
     /// much as at the centre of the cell. All of it would take up what the material can bear and leave less traction
     /// for the wall: an error of first order in the cell size where what stretches comes to rest along a
     /// wall, as under the front of a collapse.
-    fn part_beside_wall(&self, corner: [usize; D]) -> f64 {
-        let sticks = (0..D).any(|axis| self.sticks(axis, corner));
+    fn part_beside_wall(&self, cell: usize, corner: [usize; D]) -> f64 {
+        let sticks = (0..D).any(|axis| self.sticks(cell, axis, corner));
         if sticks { 0.5 } else { 1.0 }
     }
 
     /// At a corner on a rough wall that carries material the traction acts on the whole face, however thin the layer:
     /// the factor by which the points there count, so that they do as long as one of the cells
     /// holds material. On other walls it acts where material touches them.
-    fn wall_share(&self, corner: [usize; D]) -> Option<f64> {
-        let carries = |axis: usize| {
-            let side = usize::from(corner[axis] > 0);
-            self.sticks(axis, corner) && weight_onto(&self.acceleration, axis, side) > 0.0
+    fn wall_share(&self, cell: usize, corner: [usize; D]) -> Option<f64> {
+        let carries = |cell: &usize| {
+            (0..D).any(|axis| {
+                let side = usize::from(corner[axis] > 0);
+                self.sticks(*cell, axis, corner)
+                    && weight_onto(&self.acceleration, axis, side) > 0.0
+            })
         };
-        if !(0..D).any(carries) {
+        if !carries(&cell) {
             return None;
         }
         let (mut all, mut filled) = (0, 0);
-        for cell in self.cells_at_corner(corner) {
+        for cell in self.cells_at_corner(corner).filter(carries) {
             all += 1;
             filled += usize::from(self.fractions[cell] > EMPTY);
         }
@@ -579,7 +594,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         let is_one = axis == D - 1
             && corner[axis] == 0
             && weight > 0.0
-            && self.sticks(axis, corner)
+            && self.sticks(cell, axis, corner)
             && self.faces.pressure[cell] != NONE
             && above != NONE
             && self.faces.pressure[above] == NONE;
@@ -590,7 +605,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
     }
 
     /// Adds a share of the pressure on the wall beside a cell: extrapolated from it and the one behind it, under a
-    /// thin layer the layer's weight.
+    /// thin layer the layer's weight, in an outlet nothing.
     pub(super) fn add_pressure_on_wall<const V: usize>(
         &self,
         cell: usize,
@@ -599,6 +614,9 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         share: f64,
         point: &mut QuadraturePoint<C, V>,
     ) {
+        if self.topology.opens(cell, axis, side) {
+            return;
+        }
         if self.fractions[cell] <= ACTIVE {
             let weight = weight_onto(&self.acceleration, axis, side)
                 * self.fractions[cell]

@@ -134,6 +134,9 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             let Some((friction, velocity)) = friction_of(self.grid, axis, side[axis]) else {
                 continue;
             };
+            if self.topology.opens(cell, axis, side[axis]) {
+                continue;
+            }
             let carries = weight_onto(&self.acceleration, axis, side[axis]) > 0.0;
             let share = if carries { whole } else { filled };
             if share <= 0.0 || self.fractions[cell] <= EMPTY {

@@ -1,5 +1,7 @@
 //! Who touches whom on a staggered grid: tables that loops run over instead of recomputing indices.
 
+use std::ops::Range;
+
 use crate::grid::{Axis, DIMENSIONS, Grid, flatten, unflatten};
 
 /// What stands for a neighbour beyond the edge of the grid.
@@ -17,6 +19,9 @@ pub(crate) struct Topology<const D: usize = DIMENSIONS> {
     pub face_cells: [Vec<[usize; 2]>; D],
     /// For each component, face and axis, the faces of the same component below and above.
     pub face_neighbours: [Vec<[[usize; 2]; D]>; D],
+    /// Cells over an outlet in the floor ([`super::outlet`]), and the faces of the last component below them, which have
+    /// the same numbers.
+    pub outlet: Range<usize>,
 }
 
 /// Positions below and above one along an axis with `count` positions.
@@ -113,6 +118,7 @@ impl<const D: usize> Topology<D> {
             cell_neighbours,
             face_cells,
             face_neighbours,
+            outlet: 0..0,
         }
     }
 
@@ -126,9 +132,19 @@ impl<const D: usize> Topology<D> {
         self.face_cells[component].len()
     }
 
-    /// Whether a face lies on the edge of the grid.
+    /// Whether a face lies on the edge of the grid, but not in an outlet.
     pub(crate) fn is_edge(&self, component: usize, face: usize) -> bool {
-        self.face_cells[component][face].contains(&NONE)
+        self.face_cells[component][face].contains(&NONE) && !self.is_outlet(component, face)
+    }
+
+    /// Whether a face lies in an outlet.
+    pub(crate) fn is_outlet(&self, component: usize, face: usize) -> bool {
+        component + 1 == D && self.outlet.contains(&face)
+    }
+
+    /// Whether the side of a cell across an axis lies in an outlet.
+    pub(crate) fn opens(&self, cell: usize, axis: usize, side: usize) -> bool {
+        side == 0 && self.is_outlet(axis, cell)
     }
 
     /// Mean of a quantity of cells over the two cells of a face; beyond the edge it is zero.

@@ -191,6 +191,9 @@ impl<const D: usize> Transport<D> {
                     if let (Some(ends), 0) = (motion.ends, axis) {
                         self.pass_ends(motion, ends, fractions);
                     }
+                    if axis + 1 == D {
+                        self.pass_outlet(motion, fractions);
+                    }
                 }
                 Some(ground) => {
                     ground.fill(fractions, &mut self.filled);
@@ -231,6 +234,19 @@ impl<const D: usize> Transport<D> {
             self.fluxes[last] = volume.clamp(0.0, fractions[donor].max(0.0));
             self.passed[0] += self.fluxes[first];
             self.passed[1] += self.fluxes[last];
+        }
+    }
+
+    /// Volume through an outlet.
+    fn pass_outlet(&mut self, motion: &Motion<'_, D>, fractions: &[f64]) {
+        let axis = D - 1;
+        for face in motion.topology.outlet.clone() {
+            let mut to = [1.0; 3];
+            to[axis] = (-motion.carrier[axis][face] * motion.courant[axis]).max(0.0);
+            let volume = volume_in(fractions[face], self.planes[face].as_ref(), [0.0; 3], to);
+            let volume = volume.clamp(0.0, fractions[face].max(0.0));
+            self.fluxes[face] = -volume;
+            self.passed[1] += volume;
         }
     }
 
@@ -409,10 +425,32 @@ impl<const D: usize> Transport<D> {
                 self.momentum[face] -= 0.5 * (out[0] + out[1]) * u[face];
             }
         }
+        if axis + 1 == D {
+            self.take_through_outlet(topology, component, &velocity[component]);
+        }
         for (face, u) in velocity[component].iter_mut().enumerate() {
             let mass = topology.face_mean(component, face, &self.next);
             if mass > MASSLESS && !topology.is_edge(component, face) {
                 *u = self.momentum[face] / mass;
+            }
+        }
+    }
+}
+
+impl<const D: usize> Transport<D> {
+    /// What leaves through an outlet takes its momentum along: that of the faces in it, or of those that lie over it with
+    /// one of their cells or both.
+    fn take_through_outlet(&mut self, topology: &Topology<D>, component: usize, u: &[f64]) {
+        for cell in topology.outlet.clone() {
+            let flux = self.fluxes[cell];
+            if component + 1 == D {
+                self.momentum[cell] += flux * u[cell];
+                continue;
+            }
+            for face in topology.cell_faces[cell][component] {
+                if face != NONE {
+                    self.momentum[face] += 0.5 * flux * u[face];
+                }
             }
         }
     }

@@ -48,6 +48,7 @@ pub fn errors(scene: &Scene, run: &Path, reference: &Path) -> Result<Errors, Fai
             ("velocity".to_owned(), curve(run, reference, SPEEDS)),
             ("depth".to_owned(), result(run, reference, "depth_at_end")?),
         ],
+        SceneBody::SiloDischarge(_) => vec![("rate".to_owned(), result(run, reference, "rate")?)],
         SceneBody::Incline(ref body) if body.rheology.is_some() => [
             ("velocity", "u"),
             ("normal_stress", "sigma_zz"),
@@ -122,6 +123,9 @@ pub fn against_reference(scene: &Scene) -> String {
         }
         SceneBody::OpenChute(_) => {
             "the reference run; the larger of the relative L2 error of the speeds half way down and the relative error of the depth at the open end".to_owned()
+        }
+        SceneBody::SiloDischarge(_) => {
+            "the reference run; relative error of the steady rate".to_owned()
         }
         SceneBody::Incline(body) if body.rheology.is_some() => {
             "the reference run; largest relative L2 error through the depth of velocity, normal and shear stress".to_owned()

@@ -3,6 +3,7 @@
 mod collapse;
 mod joined_incline;
 mod open_chute;
+mod silo_discharge;
 
 use super::Record;
 use super::page::{figure, number};
@@ -19,6 +20,8 @@ pub fn plots(record: &Record) -> Markup {
         @if let Some(table) = record.table("pareto") { (pareto(&table, record.table("ends").as_ref())) }
         @if let (Some(profiles), Some(speeds)) = (record.table("profiles"), record.table("speeds")) {
             (open_chute::open_chute(&profiles, &speeds, record.table("balance").as_ref()))
+        } @else if let (Some(profiles), Some(discharge)) = (record.table("profiles"), record.table("discharge")) {
+            (silo_discharge::silo_discharge(&profiles, &discharge))
         } @else if let Some(table) = record.table("profiles") {
             (collapse::collapse(&table, record.table("front").as_ref()))
         }

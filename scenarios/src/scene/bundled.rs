@@ -1,7 +1,7 @@
 //! The scenes that come with the program, one file each.
 
 /// The names and texts of the bundled scenes.
-pub const BUNDLED: [(&str, &str); 25] = [
+pub const BUNDLED: [(&str, &str); 26] = [
     ("incline", include_str!("../../scenes/incline.toml")),
     (
         "incline-moderate",
@@ -60,6 +60,10 @@ pub const BUNDLED: [(&str, &str); 25] = [
         include_str!("../../scenes/cylinder-collapse.toml"),
     ),
     ("open-chute", include_str!("../../scenes/open-chute.toml")),
+    (
+        "silo-discharge",
+        include_str!("../../scenes/silo-discharge.toml"),
+    ),
     ("cliff", include_str!("../../scenes/cliff.toml")),
     ("cliff-aswan", include_str!("../../scenes/cliff-aswan.toml")),
     ("cliff-plain", include_str!("../../scenes/cliff-plain.toml")),

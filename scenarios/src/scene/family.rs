@@ -4,8 +4,8 @@
 
 use super::{
     BagnoldScene, ChuteScene, CollapseScene, CylinderScene, ImpactScene, InclineScene, Kind,
-    OpenChuteScene, ReliefKeys, SceneError, SettleScene, ShearedScene, bed, kinds, law, layers,
-    open_chute,
+    OpenChuteScene, ReliefKeys, SceneError, SettleScene, ShearedScene, SiloDischargeScene, bed,
+    kinds, law, layers, open_chute,
 };
 use crate::rheology_file::{self, FrictionOf};
 use serde_json::Value;
@@ -80,6 +80,8 @@ families! {
     Cylinder(CylinderScene),
     /// A layer that enters a chute at one end and leaves it at the other.
     OpenChute(OpenChuteScene),
+    /// A silo that runs out of a slot, as a continuum.
+    SiloDischarge(SiloDischargeScene),
 }
 
 /// A struct of keys of its own, read as it stands.
@@ -105,6 +107,7 @@ impl OneScene for SettleScene {}
 impl OneScene for CollapseScene {}
 impl OneScene for CylinderScene {}
 impl OneScene for OpenChuteScene {}
+impl OneScene for SiloDischargeScene {}
 
 impl SceneBody {
     /// The start file, where the scene names one.
@@ -150,6 +153,7 @@ impl Family {
             "column-collapse" | "cliff-plain" => Family::Collapse,
             "cylinder-collapse" => Family::Cylinder,
             "open-chute" => Family::OpenChute,
+            "silo-discharge" => Family::SiloDischarge,
             _ => Family::Incline,
         }
     }
@@ -158,7 +162,9 @@ impl Family {
     pub fn alternatives(self) -> &'static [&'static [&'static str]] {
         match self {
             Family::Incline => &INCLINE_CHOICES,
-            Family::Bagnold | Family::Sheared | Family::Cylinder => rheology_file::ALTERNATIVES,
+            Family::Bagnold | Family::Sheared | Family::Cylinder | Family::SiloDischarge => {
+                rheology_file::ALTERNATIVES
+            }
             Family::Collapse => &COLLAPSE_CHOICES,
             Family::OpenChute => &CHUTE_CHOICES,
             Family::Impact | Family::Grains => &law::CHOICES,
@@ -170,7 +176,7 @@ impl Family {
     /// file has been replaced by its numbers before.
     pub fn defaults_to_drop(self) -> &'static [&'static [&'static str]] {
         match self {
-            Family::Bagnold | Family::Sheared | Family::Cylinder => &[],
+            Family::Bagnold | Family::Sheared | Family::Cylinder | Family::SiloDischarge => &[],
             Family::Collapse => &law::CHOICES,
             Family::Incline => &INCLINE_CHOICES[..1],
             Family::OpenChute => &CHUTE_CHOICES[..1],
@@ -195,6 +201,7 @@ impl Family {
                 | Family::Collapse
                 | Family::Cylinder
                 | Family::OpenChute
+                | Family::SiloDischarge
         )
     }
 

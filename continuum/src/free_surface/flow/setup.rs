@@ -17,6 +17,7 @@ use crate::rheology::Rheology;
 use crate::terrain::Relief;
 use crate::wall_friction::SideWalls;
 use crate::yield_step::FlowState;
+use std::ops::Range;
 
 /// Cells over ground that miss less of being full count as full.
 const FULL_TO: f64 = 1e-11;
@@ -115,7 +116,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         let axis = &self.grid.axes()[0];
         let can_open = |&side: &usize| can_open(axis.boundary_at(side * axis.cells()).as_ref());
         require(
-            self.bed.is_none() && self.ends.is_none() && sides.iter().all(can_open),
+            self.is_closed() && sides.iter().all(can_open),
             if inflow.is_some() {
                 "inflow"
             } else {
@@ -312,13 +313,35 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         }
     }
 
-    /// Takes the pressure from cells that do not stand on others down to the lower edge of the grid.
+    /// Whether it is closed all around, over a level floor.
+    pub(in crate::free_surface) fn is_closed(&self) -> bool {
+        self.bed.is_none() && self.ends.is_none() && self.topology.outlet.is_empty()
+    }
+
+    /// Opens the floor under these columns.
+    pub(in crate::free_surface) fn open_floor(&mut self, columns: Range<usize>) {
+        self.topology.outlet = columns;
+        self.take_weight_from_what_hangs();
+        let points = points_of(D);
+        for (cell, pressure) in self.state.pressure.iter().enumerate() {
+            if *pressure < 0.0 {
+                self.state.stress[cell * points..][..points].fill([0.0; C]);
+            }
+        }
+        self.saved.clone_from(&self.state);
+    }
+
+    /// Takes the pressure from cells that do not stand on others down to the floor.
     fn take_weight_from_what_hangs(&mut self) {
         let axis = D - 1;
         let mut stands = vec![false; self.topology.cells()];
         for cell in 0..stands.len() {
             let below = self.topology.cell_neighbours[cell][axis][0];
-            stands[cell] = self.state.fractions[cell] > 0.0 && (below == NONE || stands[below]);
+            let carried = match below {
+                NONE => !self.topology.opens(cell, axis, 0),
+                below => stands[below],
+            };
+            stands[cell] = self.state.fractions[cell] > 0.0 && carried;
             if !stands[cell] {
                 self.state.pressure[cell] = INACTIVE;
             }
