@@ -374,7 +374,7 @@ fn refuse_foreign(path: &Path) -> Result<(), Failure> {
 }
 
 /// What a run can be gone on from, in the order in which it is named.
-const SAVED: [&str; 4] = [CHECKPOINT, CHECKPOINT_BEFORE, ANGLES, PACKING];
+const SAVED: [&str; 3] = [CHECKPOINT, CHECKPOINT_BEFORE, ANGLES];
 
 /// Hours of work must not be lost for a forgotten `--resume`.
 fn refuse_unfinished(path: &Path) -> Result<(), Failure> {
