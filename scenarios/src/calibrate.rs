@@ -17,7 +17,7 @@ use crate::progress::{Bar, Bars};
 use crate::report::calibration::Campaign;
 use crate::rheology_file::{FitRow, Provenance, RheologyFile};
 use crate::run::{self, Ended, RunOptions, incline, precheck};
-use crate::run_directory::RunDirectory;
+use crate::run_directory::{ANGLES, RunDirectory};
 use crate::scene::{InclineModel, InclineScene, Scene, SceneBody};
 use crate::summary::Status;
 use colluvium_coupling::calibration::{MuIFit, friction_table};
@@ -34,8 +34,6 @@ use std::collections::BTreeMap;
 use std::sync::Mutex;
 use std::time::Instant;
 
-/// Finished runs of a campaign that may be stopped and resumed.
-const ANGLES: &str = "angles.json";
 /// The whole campaign, for reports.
 pub const CAMPAIGN: &str = "campaign.json";
 /// The fitted law.
@@ -237,6 +235,7 @@ struct Observer<'a> {
     finished: Mutex<Angles>,
     wall_before: f64,
     start: Instant,
+    /// Why a finished run could not be saved, which stops the campaign.
     unwritten: Mutex<Option<Failure>>,
 }
 
@@ -289,7 +288,9 @@ impl Observer<'_> {
                 .map_err(|error| Failure::Run(error.to_string()))
                 .and_then(|text| self.directory.write(ANGLES, &text));
             if let (Err(failure), Ok(mut unwritten)) = (saved, self.unwritten.lock()) {
-                *unwritten = Some(failure);
+                // What follows could not be saved either: the campaign ends here, and goes on when there is room.
+                interruption::request();
+                unwritten.get_or_insert(failure);
             }
         }
     }
@@ -359,7 +360,7 @@ fn campaign(
     let dem_wall = before.wall_s + start.elapsed().as_secs_f64();
     let mut warnings = Vec::new();
     match law_to_write(scene, body, &result) {
-        Ok(file) => directory.write(RHEOLOGY, file.to_toml().as_bytes())?,
+        Ok(file) => directory.write(RHEOLOGY, file.to_toml()?.as_bytes())?,
         Err(why) => {
             let sentence = format!("No {RHEOLOGY} was written: {why}.");
             result.verdict.good = false;

@@ -11,10 +11,12 @@ use crate::plan;
 use crate::render;
 use crate::report;
 use crate::run::{self, Ended, RunOptions};
+use crate::run_directory::Replaces;
 use crate::scene::{self, Scene};
 use crate::validate;
 use clap::{Args, Parser, Subcommand};
 use colluvium_coupling::coarse_graining::Shape;
+use std::io::{ErrorKind, Write};
 use std::path::PathBuf;
 use std::time::Duration;
 
@@ -47,7 +49,7 @@ enum Command {
         #[command(flatten)]
         scene: SceneArguments,
     },
-    /// Run a scene into a directory
+    /// Run a scene into a directory; Ctrl-C writes a checkpoint, another one 2 s later or more abandons the run
     Run {
         #[command(flatten)]
         scene: SceneArguments,
@@ -269,16 +271,18 @@ struct CoarseGrainArguments {
 
 /// Numbers between commas, as many as are wanted.
 fn numbers<const N: usize>(option: &str, text: &str) -> Result<[f64; N], Failure> {
-    let list: Vec<f64> = text
-        .split(',')
-        .filter_map(|word| word.trim().parse().ok())
-        .filter(|x: &f64| x.is_finite())
-        .collect();
-    list.try_into().map_err(|_| {
+    let refuse = |why: String| {
         Failure::Input(format!(
-            "{option} {text}: {N} numbers between commas are wanted"
+            "{option} {text}: {why}; allowed: {N} numbers between commas"
         ))
-    })
+    };
+    let number = |word: &str| {
+        let value = word.trim().parse().ok().filter(|x: &f64| x.is_finite());
+        value.ok_or_else(|| refuse(format!("`{word}` is not a number")))
+    };
+    let list: Vec<f64> = text.split(',').map(number).collect::<Result<_, _>>()?;
+    list.try_into()
+        .map_err(|list: Vec<f64>| refuse(format!("{} numbers are given", list.len())))
 }
 
 impl CoarseGrainArguments {
@@ -350,6 +354,9 @@ struct RunArguments {
     /// Go on from the checkpoint in the directory
     #[arg(long)]
     resume: bool,
+    /// Replace a run in the directory that is not finished and could be gone on with
+    #[arg(long, conflicts_with = "resume")]
+    overwrite: bool,
 }
 
 impl RunArguments {
@@ -358,6 +365,10 @@ impl RunArguments {
             out: self.out.clone(),
             threads: self.threads.map(usize::from),
             resume: self.resume,
+            replaces: match self.overwrite {
+                true => Replaces::Any,
+                false => Replaces::Finished,
+            },
             checkpoint_every: None,
         }
     }
@@ -368,7 +379,7 @@ pub fn execute(line: CommandLine) -> Result<(), Failure> {
     match line.command {
         Command::Scenes { show: None } => {
             for (name, text) in scene::BUNDLED {
-                print(&format!("{name:<18} {}", first_sentence(text)));
+                print(&format!("{name:<18} {}", first_sentence(text)))?;
             }
         }
         Command::Scenes {
@@ -380,7 +391,7 @@ pub fn execute(line: CommandLine) -> Result<(), Failure> {
                     "no bundled scene is called `{name}`; allowed: {names}"
                 ))
             })?;
-            print(text.trim_end());
+            print(text.trim_end())?;
         }
         Command::Check { scene } => {
             let checked = scene.load()?;
@@ -388,12 +399,12 @@ pub fn execute(line: CommandLine) -> Result<(), Failure> {
             print(&format!(
                 "{}: a valid `{}` scene",
                 scene.scene, checked.name
-            ));
+            ))?;
         }
         Command::Plan { scene } => {
             let checked = scene.load()?;
             run::check(&checked)?;
-            print(plan::plan(&checked)?.trim_end());
+            print(plan::plan(&checked)?.trim_end())?;
         }
         Command::Run {
             scene,
@@ -425,7 +436,7 @@ pub fn execute(line: CommandLine) -> Result<(), Failure> {
                 out,
                 threads: threads.map(usize::from),
             })?;
-            print(&format!("{}\n{}", file.display(), report.display()));
+            print(&format!("{}\n{}", file.display(), report.display()))?;
         }
         Command::Pareto {
             scene,
@@ -437,10 +448,10 @@ pub fn execute(line: CommandLine) -> Result<(), Failure> {
         } => {
             let loaded = scene.load()?;
             let comparison = pareto::Comparison::new(loaded, &vary, &reference, &beside)?;
-            print(&comparison.run(out, threads.map(usize::from))?);
+            print(&comparison.run(out, threads.map(usize::from))?)?;
         }
         Command::CoarseGrain(arguments) => {
-            print(&coarse_grain::coarse_grain(&arguments.request()?)?);
+            print(&coarse_grain::coarse_grain(&arguments.request()?)?)?;
         }
         Command::Validate {
             suite,
@@ -454,7 +465,7 @@ pub fn execute(line: CommandLine) -> Result<(), Failure> {
                 set,
             };
             let (report, missed) = validate::validate(suite.as_deref(), &options)?;
-            print(&report.display().to_string());
+            print(&report.display().to_string())?;
             if missed > 0 {
                 return Err(Failure::Run(format!(
                     "{missed} figures do not agree with their references; see {}",
@@ -464,7 +475,7 @@ pub fn execute(line: CommandLine) -> Result<(), Failure> {
         }
         Command::Report { directories, out } => {
             let path = report::write_for(&directories, out.as_deref())?;
-            print(&path.display().to_string());
+            print(&path.display().to_string())?;
         }
         Command::Render {
             directory,
@@ -486,12 +497,12 @@ pub fn execute(line: CommandLine) -> Result<(), Failure> {
                 per_second,
             };
             let rendered = render::render(&directory, &request)?;
-            print(&rendered.display().to_string());
+            print(&rendered.display().to_string())?;
         }
         Command::Schema => {
             let text = serde_json::to_string_pretty(&scene::json_schema())
                 .map_err(|error| Failure::Run(error.to_string()))?;
-            print(&text);
+            print(&text)?;
         }
     }
     Ok(())
@@ -503,16 +514,21 @@ fn say(ended: &Ended) -> Result<(), Failure> {
         eprintln!("colluvium: {warning}");
     }
     if ended.already_done {
-        print("already done: nothing to resume");
+        print("already done: nothing to resume")?;
     }
-    print(&report::digest(&ended.directory)?);
+    print(&report::digest(&ended.directory)?)?;
     Ok(())
 }
 
 /// Prints to stdout. A reader that has gone away (`| head`) is not an error.
-fn print(text: &str) {
-    use std::io::Write;
-    let _ = writeln!(std::io::stdout(), "{text}");
+fn print(text: &str) -> Result<(), Failure> {
+    let mut out = std::io::stdout().lock();
+    match writeln!(out, "{text}").and_then(|()| out.flush()) {
+        Err(error) if error.kind() != ErrorKind::BrokenPipe => {
+            Err(Failure::Run(format!("cannot write to stdout: {error}")))
+        }
+        _ => Ok(()),
+    }
 }
 
 /// The first sentence of a scene's leading comment.

@@ -140,7 +140,7 @@ fn write(
     };
     put("map.csv", table(cells).to_csv().as_bytes())?;
     let report = put("report.html", page::report(&file, &map, cells).as_bytes())?;
-    Ok((put("map.toml", file.to_toml().as_bytes())?, report))
+    Ok((put("map.toml", file.to_toml()?.as_bytes())?, report))
 }
 
 fn table(cells: &[Cell]) -> Table {

@@ -8,7 +8,7 @@ use crate::cost::{Cost, processor_s};
 use crate::failure::{Failure, Resumes};
 use crate::report;
 use crate::run::{self, RunOptions};
-use crate::run_directory::{self, RunDirectory};
+use crate::run_directory::{self, Replaces, RunDirectory};
 use crate::scene::{Scene, SceneBody, SceneError};
 use crate::summary::{Quantity, Status, Summary};
 use crate::table::Table;
@@ -107,7 +107,7 @@ impl Comparison {
         for scene in self.variants.iter().map(|v| &v.scene).chain(ends) {
             run::check(scene)?;
         }
-        let directory = RunDirectory::create(&place, &self.scene, "pareto")?;
+        let directory = RunDirectory::create(&place, &self.scene, "pareto", Replaces::Finished)?;
         let start = Instant::now();
         self.finish(&directory, threads).map_err(|failure| {
             // A comparison has no state of its own to go on from.
@@ -218,6 +218,8 @@ impl Comparison {
             let options = RunOptions {
                 out,
                 threads,
+                // A comparison that is called again starts again.
+                replaces: Replaces::Any,
                 ..RunOptions::default()
             };
             let ended = if self.of_campaigns() {

@@ -2,7 +2,9 @@
 
 mod normal_stress;
 
+use crate::failure::Failure;
 use crate::map::MapFile;
+use crate::run_directory::toml_text;
 use crate::scene::{SceneError, check_continuum_keys, layers};
 use colluvium_coupling::calibration::SolidFractionFit;
 use serde::{Deserialize, Serialize};
@@ -220,14 +222,14 @@ impl RheologyFile {
     }
 
     /// The file's text.
-    pub fn to_toml(&self) -> String {
-        let body = toml::to_string_pretty(self).unwrap_or_default();
-        format!(
+    pub fn to_toml(&self) -> Result<String, Failure> {
+        let body = toml_text("the law", self)?;
+        Ok(format!(
             "# μ(I) law fitted by colluvium calibrate. SI units.\n\
              # μ = |τ|/p with p = trace/3; [mu_zz] holds the fit for |τ|/σ_zz instead.\n\
              # Outside valid_i (inertial numbers) the law was not measured.\n\
              # [solid_fraction_of_i]: phi = intercept - slope I.\n{body}"
-        )
+        ))
     }
 
     /// The keys of a scene's `rheology` table.
@@ -381,7 +383,23 @@ mod tests {
         for bad in [law(-0.1, 0.8, 0.3), law(0.5, 0.4, 0.3), law(0.5, 1e9, 0.3)] {
             assert!(bad.check().is_err(), "{bad:?}");
         }
-        let again: RheologyFile = toml::from_str(&law(0.5, 40.0, 1e3).to_toml()).unwrap();
+        let again: RheologyFile = toml::from_str(&law(0.5, 40.0, 1e3).to_toml().unwrap()).unwrap();
         assert_eq!(again, law(0.5, 40.0, 1e3));
+    }
+
+    #[test]
+    fn a_law_that_cannot_be_written_is_an_error() {
+        let mut long = law(0.5, 0.8, 0.3);
+        long.provenance = Some(Provenance {
+            version: String::new(),
+            scene: String::new(),
+            flow_degrees: Vec::new(),
+            // TOML knows no integers beyond 2⁶³ − 1.
+            seed: u64::MAX,
+            friction: String::new(),
+            verdict: String::new(),
+        });
+        let why = long.to_toml().unwrap_err().to_string();
+        assert!(why.contains("the law cannot be written"), "{why}");
     }
 }

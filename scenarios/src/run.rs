@@ -52,7 +52,7 @@ use crate::failure::{Failure, Resumes};
 use crate::frames;
 use crate::report;
 use crate::results_file;
-use crate::run_directory::{self, RunDirectory};
+use crate::run_directory::{self, Replaces, RunDirectory};
 use crate::scene::{InclineModel, Scene, SceneBody};
 use crate::summary::{Status, Summary};
 use crate::table::Table;
@@ -70,6 +70,8 @@ pub struct RunOptions {
     pub threads: Option<usize>,
     /// Goes on from the checkpoint in the directory.
     pub resume: bool,
+    /// What may be replaced in the directory.
+    pub replaces: Replaces,
     /// Wall time between two checkpoints; none for [`CHECKPOINT_EVERY`].
     pub checkpoint_every: Option<Duration>,
 }
@@ -194,7 +196,7 @@ impl Under<'_> {
 /// Opens or makes the directory of a run; for one that goes on, also gives its summary.
 ///
 /// Everything that can be checked without computing has to be checked before: an earlier run that
-/// stands there is removed.
+/// may be replaced is removed.
 pub fn open_directory(
     scene: &Scene,
     options: &RunOptions,
@@ -211,7 +213,8 @@ pub fn open_directory(
         Ok((directory, Some(summary)))
     } else {
         let place = run_directory::place(options.out.as_deref(), &scene.name);
-        Ok((RunDirectory::create(&place, scene, command)?, None))
+        let directory = RunDirectory::create(&place, scene, command, options.replaces)?;
+        Ok((directory, None))
     }
 }
 

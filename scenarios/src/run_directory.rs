@@ -1,5 +1,11 @@
 //! The directory of a run: where it lies, what may be overwritten, how files are put in place.
 
+mod hold;
+mod inputs;
+
+pub use hold::abandon_all;
+pub use inputs::checksums_of;
+
 use crate::failure::Failure;
 use crate::journal::Journal;
 use crate::report;
@@ -7,6 +13,8 @@ use crate::results_file::put_in_place;
 use crate::scene::Scene;
 use crate::summary::{Status, Summary};
 use crate::table::Table;
+use hold::{Hold, LOCK};
+use inputs::INPUTS;
 use std::fs;
 use std::io::Write;
 use std::path::{Path, PathBuf};
@@ -29,13 +37,17 @@ pub const PACKING: &str = "packing.h5";
 pub const SHEARED: &str = "sheared.h5";
 /// Name of the log.
 pub const LOG: &str = "log.txt";
+/// Name of the finished runs of a campaign that may be stopped and resumed.
+pub const ANGLES: &str = "angles.json";
 /// The run in motion.
 pub const ANIMATION: &str = "animation.gif";
 
 /// Every file that a run, a campaign or a comparison writes.
-const OWN_FILES: [&str; 53] = [
+const OWN_FILES: [&str; 55] = [
     ANIMATION,
     SCENE,
+    INPUTS,
+    LOCK,
     REPORT,
     RESULTS,
     CHECKPOINT,
@@ -86,7 +98,7 @@ const OWN_FILES: [&str; 53] = [
     "stop_curve.csv",
     "rheology.toml",
     "campaign.json",
-    "angles.json",
+    ANGLES,
 ];
 
 /// A run directory that has been created.
@@ -99,6 +111,18 @@ pub struct RunDirectory {
     made: Option<PathBuf>,
     /// The log.
     pub journal: Journal,
+    /// Keeps other processes out.
+    _hold: Hold,
+}
+
+/// What a new run may replace besides a finished one.
+#[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
+pub enum Replaces {
+    /// A run that could be gone on with is kept.
+    #[default]
+    Finished,
+    /// Any run.
+    Any,
 }
 
 /// Where a run will be written: `--out`, or the first free `results/<scene>-<n>`.
@@ -123,12 +147,14 @@ pub fn is_run(path: &Path) -> bool {
 impl RunDirectory {
     /// Makes the directory and puts summary, resolved scene and log in it.
     ///
-    /// A run of ours that stands there is replaced; any other folder with files in it is refused,
-    /// and so is one that holds what the scene was read from.
+    /// A finished run of ours that stands there is replaced, one that could be gone on with only if that was asked for;
+    /// any other folder with files in it is refused, and so is one that holds what the scene was read from, or in which
+    /// another process writes.
     pub fn create(
         path: &Path,
         scene: &Scene,
         command: &'static str,
+        may: Replaces,
     ) -> Result<RunDirectory, Failure> {
         refuse_foreign(path)?;
         refuse_own_input(path, scene)?;
@@ -143,7 +169,12 @@ impl RunDirectory {
                 path.display()
             ))
         };
+        let inputs = inputs::checksums(scene)?;
         fs::create_dir_all(path).map_err(unwritable)?;
+        let hold = Hold::take(path)?;
+        if may == Replaces::Finished {
+            refuse_unfinished(path)?;
+        }
         let replaces = is_run(path);
         // The summary first: whatever happens from here on, the folder is known as a run.
         let begun = summary_text(&Summary::begun(&scene.name, command))?;
@@ -151,7 +182,10 @@ impl RunDirectory {
         if replaces {
             remove_old_run(path).map_err(unwritable)?;
         }
-        write_in_place(&path.join(SCENE), scene.to_toml().as_bytes()).map_err(unwritable)?;
+        if let Some(text) = inputs {
+            write_in_place(&path.join(INPUTS), text.as_bytes()).map_err(unwritable)?;
+        }
+        write_in_place(&path.join(SCENE), scene.to_toml()?.as_bytes()).map_err(unwritable)?;
         let journal = Journal::open(&path.join(LOG), false).map_err(unwritable)?;
         Ok(RunDirectory {
             path: path.to_owned(),
@@ -159,6 +193,7 @@ impl RunDirectory {
             scene: scene.name.clone(),
             made,
             journal,
+            _hold: hold,
         })
     }
 
@@ -170,8 +205,13 @@ impl RunDirectory {
         command: &'static str,
     ) -> Result<(RunDirectory, Summary), Failure> {
         let shown = path.display();
-        let summary = report::read_summary(path)
-            .map_err(|error| Failure::Input(format!("--resume: {error}")))?;
+        let read = || {
+            report::read_summary(path).map_err(|error| Failure::Input(format!("--resume: {error}")))
+        };
+        // Only a run has something to hold, and what it says counts once it is held.
+        read()?;
+        let hold = Hold::take(path)?;
+        let summary = read()?;
         if summary.command != command {
             return Err(Failure::Input(format!(
                 "--resume: {shown} was written by `{}`, not by `{command}`; allowed: the directory of an interrupted `{command}`",
@@ -183,7 +223,9 @@ impl RunDirectory {
             .any(|name| path.join(name).exists());
         if summary.status == Status::Running && !begun {
             // Killed while its folder was made: there is nothing to go on from.
-            return Ok((RunDirectory::create(path, scene, command)?, summary));
+            drop(hold);
+            let directory = RunDirectory::create(path, scene, command, Replaces::Finished)?;
+            return Ok((directory, summary));
         }
         let text = fs::read_to_string(path.join(SCENE)).map_err(|error| {
             Failure::Input(format!(
@@ -198,6 +240,9 @@ impl RunDirectory {
                 keys.join(", ")
             )));
         }
+        if summary.status != Status::Done {
+            inputs::refuse_others(path, scene)?;
+        }
         let journal = Journal::open(&path.join(LOG), true).map_err(|error| {
             Failure::Input(format!("--out {shown}: cannot write there: {error}"))
         })?;
@@ -207,6 +252,7 @@ impl RunDirectory {
             scene: scene.name.clone(),
             made: None,
             journal,
+            _hold: hold,
         };
         Ok((directory, summary))
     }
@@ -271,6 +317,21 @@ impl RunDirectory {
     }
 }
 
+/// A value as TOML.
+pub fn toml_text(what: &str, value: &impl serde::Serialize) -> Result<String, Failure> {
+    toml::to_string_pretty(value).map_err(|error| unwritten(what, error))
+}
+
+/// A value as a table of keys.
+pub fn toml_table(what: &str, value: &impl serde::Serialize) -> Result<toml::Table, Failure> {
+    toml::Table::try_from(value).map_err(|error| unwritten(what, error))
+}
+
+/// What could not be written, and why.
+pub fn unwritten(what: &str, error: toml::ser::Error) -> Failure {
+    Failure::Run(format!("{what} cannot be written as TOML: {error}"))
+}
+
 /// The text of `summary.json`.
 pub fn summary_text(summary: &Summary) -> Result<String, Failure> {
     let text = serde_json::to_string_pretty(summary)
@@ -300,16 +361,36 @@ fn refuse_foreign(path: &Path) -> Result<(), Failure> {
             "--out {shown}: is a file; allowed: a new, an empty or an earlier run's directory"
         )));
     }
-    // What is left of a run that was killed while it wrote its very first file is nobody's.
-    let first = format!("{SUMMARY}.partial");
-    let occupied = fs::read_dir(path)
-        .is_ok_and(|entries| entries.flatten().any(|entry| entry.file_name() != *first));
+    // What is left of a run that was killed while it wrote its very first files is nobody's.
+    let first = [LOCK, &format!("{SUMMARY}.partial")];
+    let others = |entry: fs::DirEntry| !first.iter().any(|name| entry.file_name() == **name);
+    let occupied = fs::read_dir(path).is_ok_and(|entries| entries.flatten().any(others));
     if occupied && !is_run(path) {
         return Err(Failure::Input(format!(
             "--out {shown}: is not empty and not a run directory; allowed: a new, an empty or an earlier run's directory"
         )));
     }
     Ok(())
+}
+
+/// What a run can be gone on from, in the order in which it is named.
+const SAVED: [&str; 3] = [CHECKPOINT, CHECKPOINT_BEFORE, ANGLES];
+
+/// Hours of work must not be lost for a forgotten `--resume`.
+fn refuse_unfinished(path: &Path) -> Result<(), Failure> {
+    let Ok(text) = fs::read_to_string(path.join(SUMMARY)) else {
+        return Ok(());
+    };
+    let summary = serde_json::from_str::<serde_json::Value>(&text).unwrap_or_default();
+    let saved = SAVED.iter().find(|name| path.join(name).exists());
+    match saved {
+        Some(saved) if summary["status"] != "done" => Err(Failure::Input(format!(
+            "--out {}: holds a run of `{}` that is not finished and can be gone on with ({saved}); allowed: --resume to go on with it, --overwrite of `run` and `calibrate` to give it up, or another directory",
+            path.display(),
+            summary["scene"].as_str().unwrap_or("another scene"),
+        ))),
+        _ => Ok(()),
+    }
 }
 
 /// A run directory is emptied before a new run: what the scene is read from must not be in it.
@@ -349,8 +430,10 @@ fn remove_old_run(path: &Path) -> std::io::Result<()> {
         .filter_map(|entry| entry.ok()?.file_name().into_string().ok())
         .filter(numbered)
         .collect();
+    // The lock is held.
     for name in OWN_FILES
         .into_iter()
+        .filter(|name| *name != LOCK)
         .chain(numbered.iter().map(String::as_str))
     {
         match fs::remove_file(path.join(name)) {

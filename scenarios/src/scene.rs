@@ -83,7 +83,7 @@ pub use incline::{
     Bracket, CalibrationKeys, ContactKeys, FloorKeys, GrainKeys, GuessKeys, InclineScene,
     InclineStart, SizeLaw, TimeKeys, TimestepKeys,
 };
-pub use kinds::Kind;
+pub use kinds::{Kind, inputs as grain_inputs};
 pub use law::{
     CohesionKind, LawKeys, LeverKind, MemoryKind, NormalKind, Parts, RollingKind, TangentialKind,
 };
@@ -97,7 +97,8 @@ pub use silo_discharge::{SiloDischargeScene, SiloGrid};
 pub use tensile::{ClampKind, TensileScene};
 pub use tumbling_box::{Attitude, BedKeys, LanderKeys, TumblingBoxScene};
 
-use crate::rheology_file;
+use crate::failure::Failure;
+use crate::{rheology_file, run_directory};
 use bundled::base_of;
 use family::Family;
 use serde_json::{Value, json};
@@ -264,10 +265,17 @@ impl Scene {
         }
     }
 
+    /// The files whose numbers are not keys of the resolved scene.
+    pub fn files(&self) -> Vec<PathBuf> {
+        self.body.inputs(&self.resolved)
+    }
+
     /// The resolved scene as TOML.
-    pub fn to_toml(&self) -> String {
-        let body = toml::to_string_pretty(&self.resolved).unwrap_or_default();
-        format!("# Resolved scene: every key with the value that was used. SI units.\n{body}")
+    pub fn to_toml(&self) -> Result<String, Failure> {
+        let body = run_directory::toml_text("the resolved scene", &self.resolved)?;
+        Ok(format!(
+            "# Resolved scene: every key with the value that was used. SI units.\n{body}"
+        ))
     }
 }
 
@@ -355,7 +363,7 @@ mod tests {
         for (name, _) in BUNDLED {
             let scene = Scene::load(name, &[]).unwrap();
             assert_eq!(scene.name, name);
-            let again = Scene::from_text(&scene.to_toml(), "resolved").unwrap();
+            let again = Scene::from_text(&scene.to_toml().unwrap(), "resolved").unwrap();
             assert_eq!(scene, again);
         }
     }

@@ -31,6 +31,13 @@ fn checksum(file: &mut impl Read, length: u64) -> io::Result<u32> {
     Ok(hasher.finalize())
 }
 
+/// Checksum of a whole file, as 8 hex digits.
+pub fn of_file(path: &Path) -> io::Result<String> {
+    let mut file = File::open(path)?;
+    let length = file.metadata()?.len();
+    Ok(format!("{:08x}", checksum(&mut file, length)?))
+}
+
 /// Adds the line to a finished file.
 pub fn close(path: &Path) -> io::Result<()> {
     let mut file = OpenOptions::new().read(true).append(true).open(path)?;

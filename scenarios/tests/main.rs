@@ -28,6 +28,7 @@ mod own_scenes;
 mod packings;
 mod recipes;
 mod restart;
+mod safety;
 mod scenes;
 mod sheared;
 mod silo_discharge;

@@ -84,7 +84,12 @@ fn tables(path: &Path, what: &str) -> Result<Vec<Table>, String> {
             }
             "TIME" => table.time = Some(parse(next("a time")?, "a time")?),
             "UNITS" => {
-                next("a name of units")?;
+                let units = next("a name of units")?.trim();
+                if units != "si" {
+                    return Err(format!(
+                        "behind line {number}: units `{units}` cannot be read; allowed: si, or a dump without `ITEM: UNITS` that is in SI units"
+                    ));
+                }
             }
             _ if item.starts_with("NUMBER OF") => {
                 count = parse(next("a number")?, "a number of rows")? as usize;

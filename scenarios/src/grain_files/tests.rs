@@ -19,6 +19,26 @@ const LOCAL: &str = "ITEM: TIMESTEP\n100\nITEM: NUMBER OF ENTRIES\n1\nITEM: BOX 
     ITEM: ENTRIES index c_1[1] c_1[2] c_2[1] c_2[2] c_2[3]\n1 7 3 5.0 0.0 1.0\n";
 
 #[test]
+fn units_other_than_si_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let path = folder.path().join("a.dump");
+    let unsaid = Unsaid {
+        timestep: Some(1e-3),
+        ..Unsaid::default()
+    };
+    let with = |units: &str| {
+        std::fs::write(&path, format!("ITEM: UNITS\n{units}\n{ATOMS}")).unwrap();
+        all(&path, &unsaid)
+    };
+    assert_eq!(with("si").unwrap().len(), 1);
+    for units in ["lj", "cgs", "real"] {
+        let why = with(units).unwrap_err().to_string();
+        let told = why.contains("a.dump") && why.contains(&format!("`{units}`"));
+        assert!(told && why.contains("allowed: si"), "{why}");
+    }
+}
+
+#[test]
 fn a_dump_with_its_contacts_becomes_a_snapshot() {
     let folder = tempfile::tempdir().unwrap();
     let (grains, local) = (folder.path().join("a.dump"), folder.path().join("c.dump"));

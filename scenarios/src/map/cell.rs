@@ -134,7 +134,7 @@ fn once(scene: &Scene, out: &Path, threads: Option<usize>) -> Result<(), Failure
         resume: is_run(out),
         out: Some(out.to_owned()),
         threads,
-        checkpoint_every: None,
+        ..RunOptions::default()
     };
     match scene.body {
         SceneBody::Incline(_) => calibrate::calibrate(scene, &options),

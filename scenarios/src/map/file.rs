@@ -1,6 +1,8 @@
 //! `map.toml`: laws and angles of repose on a grid of β and μ_R, with where they come from.
 
+use crate::failure::Failure;
 use crate::rheology_file::{FitRow, Provenance, RheologyFile};
+use crate::run_directory::unwritten;
 use crate::scene::SceneError;
 use colluvium_coupling::calibration::{FrictionMap, InterpolationError, MapCell, MapError};
 use serde::{Deserialize, Serialize};
@@ -112,12 +114,12 @@ impl MapFile {
     }
 
     /// The file's text.
-    pub fn to_toml(&self) -> String {
-        let body = toml::to_string(self).unwrap_or_default();
-        format!(
+    pub fn to_toml(&self) -> Result<String, Failure> {
+        let body = toml::to_string(self).map_err(|error| unwritten("the map", error))?;
+        Ok(format!(
             "# Laws and angles of repose by the contact law's beta and mu_R, measured by colluvium map. SI units, degrees.\n\
              # friction: mu at the three inertial_numbers; curve: |tau|/p with p = trace/3; curve_zz: |tau|/sigma_zz.\n{body}"
-        )
+        ))
     }
 }
 
@@ -163,7 +165,7 @@ mod tests {
     #[test]
     fn a_map_in_a_file_gives_laws_inside_and_refuses_places_outside() {
         let file = made_up();
-        let again: MapFile = toml::from_str(&file.to_toml()).unwrap();
+        let again: MapFile = toml::from_str(&file.to_toml().unwrap()).unwrap();
         assert_eq!(again, file);
         for (beta, mu_r) in [(0.1, 0.5), (1.0, 2.0), (0.3, 1.0)] {
             let law = file.rheology(beta, mu_r).unwrap();
@@ -181,7 +183,7 @@ mod tests {
     fn a_scene_takes_its_law_from_a_place_on_a_map() {
         let folder = tempfile::tempdir().unwrap();
         let path = folder.path().join("map.toml");
-        std::fs::write(&path, made_up().to_toml()).unwrap();
+        std::fs::write(&path, made_up().to_toml().unwrap()).unwrap();
         let from = |beta: f64| {
             format!(
                 "rheology.from={{beta={beta:?}, mu_r=1.0, map=\"{}\"}}",
@@ -203,7 +205,7 @@ mod tests {
             "{source}"
         );
         // The resolved scene stands alone, and another size of grains is no other law.
-        let text = scene.to_toml();
+        let text = scene.to_toml().unwrap();
         assert!(!text.contains("from"), "{text}");
         let set = [from(0.3), "rheology.diameter=0.002".to_owned()];
         let finer = load("bagnold", &set).unwrap();

@@ -14,6 +14,7 @@
 use super::world::workshop::{Surroundings, step_for};
 use super::world::{Course, Expected, Ran, Recipe, RecipeKeys, Workshop, World};
 use crate::failure::Failure;
+use crate::run_directory::toml_table;
 use crate::scene::world::Materials;
 use crate::scene::{AngleOfReposeScene, layers};
 use crate::summary::{Figure, Quantity, Summary};
@@ -220,15 +221,15 @@ impl Recipe for AngleOfReposeScene {
         }
     }
 
-    fn provenance(&self) -> Option<toml::Table> {
-        let mut keys = toml::Table::try_from(self).unwrap_or_default();
+    fn provenance(&self) -> Result<Option<toml::Table>, Failure> {
+        let mut keys = toml_table("the preparation", self)?;
         for later in ["packing", "output", "search"] {
             keys.remove(later);
         }
         for step in ["seconds", "safety"] {
             layers::remove(&mut keys, &format!("timestep.{step}"));
         }
-        Some(keys)
+        Ok(Some(keys))
     }
 
     fn prepare(&self, shop: &mut Workshop, _: &str) -> Result<(), Failure> {

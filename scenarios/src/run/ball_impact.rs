@@ -8,6 +8,7 @@ mod sheared_packings;
 use super::world::workshop::{Surroundings, softened, step_for};
 use super::world::{Expected, Ran, Recipe, RecipeKeys, Workshop, World};
 use crate::failure::Failure;
+use crate::run_directory::toml_table;
 use crate::scene::world::{Materials, Place};
 use crate::scene::{BallImpactScene, layers};
 use crate::summary::{Figure, Quantity, Summary};
@@ -181,8 +182,8 @@ impl Recipe for BallImpactScene {
         }
     }
 
-    fn provenance(&self) -> Option<toml::Table> {
-        let mut keys = toml::Table::try_from(self).unwrap_or_default();
+    fn provenance(&self) -> Result<Option<toml::Table>, Failure> {
+        let mut keys = toml_table("the preparation", self)?;
         for later in [
             "model",
             "speed",
@@ -199,7 +200,7 @@ impl Recipe for BallImpactScene {
         for step in ["seconds", "safety"] {
             layers::remove(&mut keys, &format!("timestep.{step}"));
         }
-        Some(keys)
+        Ok(Some(keys))
     }
 
     fn prepare(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure> {

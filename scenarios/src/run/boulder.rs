@@ -10,6 +10,7 @@ use super::comet_block::CometBlock;
 use super::world::fragments::{self, Fragment};
 use super::world::{Course, Expected, Ran, Recipe, RecipeKeys, Workshop, World};
 use crate::failure::Failure;
+use crate::run_directory::toml_table;
 use crate::scene::world::{Materials, Place};
 use crate::scene::{BoulderScene, layers};
 use crate::summary::{Figure, Quantity, Summary};
@@ -138,8 +139,8 @@ impl Recipe for BoulderScene {
         }
     }
 
-    fn provenance(&self) -> Option<toml::Table> {
-        let mut keys = toml::Table::try_from(self).unwrap_or_default();
+    fn provenance(&self) -> Result<Option<toml::Table>, Failure> {
+        let mut keys = toml_table("the preparation", self)?;
         for later in [
             "packing",
             "impact",
@@ -153,7 +154,7 @@ impl Recipe for BoulderScene {
         ] {
             layers::remove(&mut keys, later);
         }
-        Some(keys)
+        Ok(Some(keys))
     }
 
     fn prepare(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure> {

@@ -21,6 +21,7 @@ use super::world::boulders::boulders;
 use super::world::workshop::Surroundings;
 use super::world::{Course, Expected, Ran, Recipe, RecipeKeys, Workshop, World, fragments};
 use crate::failure::Failure;
+use crate::run_directory::toml_table;
 use crate::scene::world::{Materials, Place};
 use crate::scene::{CliffScene, layers};
 use crate::summary::{Figure, Summary};
@@ -108,8 +109,8 @@ impl Recipe for CliffScene {
         }
     }
 
-    fn provenance(&self) -> Option<toml::Table> {
-        let mut keys = toml::Table::try_from(self).unwrap_or_default();
+    fn provenance(&self) -> Result<Option<toml::Table>, Failure> {
+        let mut keys = toml_table("the preparation", self)?;
         for later in [
             "model",
             "packing",
@@ -129,7 +130,7 @@ impl Recipe for CliffScene {
         ] {
             layers::remove(&mut keys, later);
         }
-        Some(keys)
+        Ok(Some(keys))
     }
 
     fn prepare(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure> {

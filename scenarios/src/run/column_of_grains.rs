@@ -9,6 +9,7 @@ use super::land::Land;
 use super::world::workshop::{Surroundings, softened, step_for};
 use super::world::{Course, Expected, Ran, Recipe, RecipeKeys, Workshop, World, fragments};
 use crate::failure::Failure;
+use crate::run_directory::toml_table;
 use crate::scene::world::{Materials, Place};
 use crate::scene::{CollapseScene, ColumnFloorKind, DENSE, layers};
 use crate::summary::{Quantity, Summary};
@@ -237,8 +238,8 @@ impl Recipe for CollapseScene {
         }
     }
 
-    fn provenance(&self) -> Option<toml::Table> {
-        let mut keys = toml::Table::try_from(self).unwrap_or_default();
+    fn provenance(&self) -> Result<Option<toml::Table>, Failure> {
+        let mut keys = toml_table("the preparation", self)?;
         for later in [
             "model",
             "duration_scaled",
@@ -262,7 +263,7 @@ impl Recipe for CollapseScene {
         {
             keys.insert("terrain".into(), points);
         }
-        Some(keys)
+        Ok(Some(keys))
     }
 
     fn prepare(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure> {

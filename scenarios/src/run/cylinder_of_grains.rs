@@ -17,6 +17,7 @@ use super::heap::{HeapAxis, HeapCourse, edge};
 use super::world::workshop::{Surroundings, softened};
 use super::world::{Course, Expected, Ran, Recipe, RecipeKeys, Workshop, World};
 use crate::failure::Failure;
+use crate::run_directory::toml_table;
 use crate::scene::world::{Materials, Place};
 use crate::scene::{DENSE, GrainCylinderScene, layers};
 use crate::summary::{Figure, Quantity, Summary};
@@ -199,8 +200,8 @@ impl Recipe for GrainCylinderScene {
         }
     }
 
-    fn provenance(&self) -> Option<toml::Table> {
-        let mut keys = toml::Table::try_from(self).unwrap_or_default();
+    fn provenance(&self) -> Result<Option<toml::Table>, Failure> {
+        let mut keys = toml_table("the preparation", self)?;
         for later in [
             "duration_scaled",
             "front_height_scaled",
@@ -213,7 +214,7 @@ impl Recipe for GrainCylinderScene {
         ] {
             layers::remove(&mut keys, later);
         }
-        Some(keys)
+        Ok(Some(keys))
     }
 
     fn prepare(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure> {

@@ -6,6 +6,7 @@ use super::world::steps::{self, Around};
 use super::world::workshop::Surroundings;
 use super::world::{Expected, Ran, Recipe, RecipeKeys, Workshop, World};
 use crate::failure::Failure;
+use crate::run_directory::toml_table;
 use crate::scene::world::{
     Materials, Place, PrepareKind, bodies, bond_rules, clumps, region, walls,
 };
@@ -51,11 +52,11 @@ impl Recipe for GrainsScene {
     }
 
     /// All that decides a preparation; bonds, cracks and what happens afterwards do not.
-    fn provenance(&self) -> Option<toml::Table> {
+    fn provenance(&self) -> Result<Option<toml::Table>, Failure> {
         if self.prepare.is_empty() {
-            return None;
+            return Ok(None);
         }
-        let mut keys = toml::Table::try_from(self).unwrap_or_default();
+        let mut keys = toml_table("the preparation", self)?;
         for later in [
             "duration", "packing", "velocity", "output", "bodies", "bonds", "cracks",
         ] {
@@ -81,7 +82,7 @@ impl Recipe for GrainsScene {
         for wall in self.walls.keys() {
             layers::remove(&mut keys, &format!("walls.{wall}.motion"));
         }
-        Some(keys)
+        Ok(Some(keys))
     }
 
     fn prepare(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure> {

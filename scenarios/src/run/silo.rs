@@ -12,6 +12,7 @@ mod beverloo;
 use super::world::workshop::{Surroundings, step_for};
 use super::world::{Expected, Ran, Recipe, RecipeKeys, Workshop, World};
 use crate::failure::Failure;
+use crate::run_directory::toml_table;
 use crate::scene::world::{Materials, Place};
 use crate::scene::{SiloScene, layers};
 use crate::summary::{Figure, Quantity, Summary};
@@ -188,15 +189,15 @@ impl Recipe for SiloScene {
         }
     }
 
-    fn provenance(&self) -> Option<toml::Table> {
-        let mut keys = toml::Table::try_from(self).unwrap_or_default();
+    fn provenance(&self) -> Result<Option<toml::Table>, Failure> {
+        let mut keys = toml_table("the preparation", self)?;
         for later in ["duration", "packing", "output"] {
             keys.remove(later);
         }
         for step in ["seconds", "safety"] {
             layers::remove(&mut keys, &format!("timestep.{step}"));
         }
-        Some(keys)
+        Ok(Some(keys))
     }
 
     fn prepare(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure> {

@@ -15,6 +15,7 @@ use super::world::fragments;
 use super::world::workshop::Surroundings;
 use super::world::{Course, Expected, Ran, Recipe, RecipeKeys, Workshop, World};
 use crate::failure::Failure;
+use crate::run_directory::toml_table;
 use crate::scene::world::{Materials, Place};
 use crate::scene::{ClampKind, MixKind, TensileScene, layers};
 use crate::summary::{Figure, Quantity, Summary};
@@ -98,8 +99,8 @@ impl Recipe for TensileScene {
         }
     }
 
-    fn provenance(&self) -> Option<toml::Table> {
-        let mut keys = toml::Table::try_from(self).unwrap_or_default();
+    fn provenance(&self) -> Result<Option<toml::Table>, Failure> {
+        let mut keys = toml_table("the preparation", self)?;
         for later in [
             "packing",
             "pull",
@@ -112,7 +113,7 @@ impl Recipe for TensileScene {
         ] {
             layers::remove(&mut keys, later);
         }
-        Some(keys)
+        Ok(Some(keys))
     }
 
     fn prepare(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure> {

@@ -3,6 +3,7 @@
 use super::world::workshop::{Surroundings, step_for};
 use super::world::{Course, Expected, Ran, Recipe, RecipeKeys, Workshop, World};
 use crate::failure::Failure;
+use crate::run_directory::toml_table;
 use crate::scene::world::{Materials, Place};
 use crate::scene::{TumblingBoxScene, layers};
 use crate::summary::{Figure, Quantity, Summary};
@@ -144,15 +145,15 @@ impl Recipe for TumblingBoxScene {
     }
 
     /// All that decides a bed; the lander does not.
-    fn provenance(&self) -> Option<toml::Table> {
-        let mut keys = toml::Table::try_from(self).unwrap_or_default();
+    fn provenance(&self) -> Result<Option<toml::Table>, Failure> {
+        let mut keys = toml_table("the preparation", self)?;
         for later in ["duration", "packing", "output", "lander"] {
             keys.remove(later);
         }
         for step in ["timestep.seconds", "timestep.safety", "surfaces.lander"] {
             layers::remove(&mut keys, step);
         }
-        Some(keys)
+        Ok(Some(keys))
     }
 
     fn prepare(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure> {

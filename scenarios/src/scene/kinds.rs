@@ -151,8 +151,8 @@ fn anchor_at(table: &mut toml::Table, path: &str, folder: &std::path::Path) {
     }
 }
 
-/// The files that a scene reads.
-pub(super) fn inputs(table: &toml::Table) -> Vec<std::path::PathBuf> {
+/// The files that keys of a scene of grains name.
+pub fn inputs(table: &toml::Table) -> Vec<std::path::PathBuf> {
     let mut found = Vec::new();
     for path in FILES {
         gather(table, path, &mut found);

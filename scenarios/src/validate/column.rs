@@ -92,7 +92,7 @@ impl Suite<'_> {
                 resume: run_directory::is_run(&out),
                 out: Some(out.clone()),
                 threads: self.options.threads,
-                checkpoint_every: None,
+                ..RunOptions::default()
             },
         )?;
         self.found

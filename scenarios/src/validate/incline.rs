@@ -99,7 +99,7 @@ pub(super) fn run(options: &Options) -> Result<Found, Failure> {
                 resume: crate::run_directory::is_run(&out),
                 out: Some(out.clone()),
                 threads: options.threads,
-                checkpoint_every: None,
+                ..RunOptions::default()
             },
         )?;
         found.reports.push(format!("{name}/report.html"));

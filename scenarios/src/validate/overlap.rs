@@ -57,7 +57,7 @@ pub(super) fn run(options: &Options) -> Result<Found, Failure> {
                 resume: run_directory::is_run(&out),
                 out: Some(out.clone()),
                 threads: options.threads,
-                checkpoint_every: None,
+                ..RunOptions::default()
             },
         )?;
         found.reports.push(format!("overlap/{name}/report.html"));

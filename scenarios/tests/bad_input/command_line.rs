@@ -38,6 +38,21 @@ pub const CASES: &[Case] = &[
         &["pareto", "bagnold", "--vary", "grid.cells=16,-1"],
         &["grid.cells", "-1", "[4, 4096]"],
     ),
+    (
+        &[
+            "coarse-grain",
+            "none",
+            "--gravity",
+            "0,x,0,-9.81",
+            "--out",
+            "new",
+        ],
+        &["--gravity", "`x`", "3 numbers"],
+    ),
+    (
+        &["coarse-grain", "none", "--gravity", "0,0", "--out", "new"],
+        &["--gravity", "2 numbers", "3 numbers"],
+    ),
     (&["report", "nowhere"], &["nowhere", "summary.json"]),
     (&["scenes", "show", "nothing"], &["nothing", "bagnold"]),
     (&["walk"], &["walk"]),

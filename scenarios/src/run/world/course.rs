@@ -151,7 +151,7 @@ fn make(recipe: &dyn Recipe, materials: &Materials, under: &Under) -> Result<Sto
     Ok(Stored {
         packing,
         materials: materials.names.clone(),
-        provenance: recipe.provenance().unwrap_or_default(),
+        provenance: store::provenance(recipe)?.unwrap_or_default(),
         notes,
         grain_steps,
     })

@@ -65,7 +65,7 @@ pub trait Recipe: Debug + Sync {
 
     /// What the preparation goes by: a packing that was made by anything else is refused. None where the
     /// scene has no preparation of its own.
-    fn provenance(&self) -> Option<toml::Table>;
+    fn provenance(&self) -> Result<Option<toml::Table>, Failure>;
 
     /// Puts the grains in place.
     fn prepare(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure>;
@@ -181,7 +181,7 @@ macro_rules! as_the_scene {
             self.scene.keys()
         }
 
-        fn provenance(&self) -> Option<toml::Table> {
+        fn provenance(&self) -> Result<Option<toml::Table>, $crate::failure::Failure> {
             self.scene.provenance()
         }
 

@@ -7,7 +7,8 @@
 use super::packing_file::{self, Stored};
 use super::recipe::Recipe;
 use crate::failure::Failure;
-use crate::run_directory::differing_keys;
+use crate::run_directory::{checksums_of, differing_keys};
+use crate::scene::grain_inputs;
 use crate::scene::world::Materials;
 use std::path::{Path, PathBuf};
 
@@ -48,32 +49,48 @@ pub fn find(
     }
     let stored =
         packing_file::read(&path).map_err(|why| refuse(format!("{}: {why}", path.display())))?;
-    if let Some(why) = mismatch(recipe, materials, &stored) {
+    if let Some(why) = mismatch(recipe, materials, &stored)? {
         return Err(refuse(format!("{}: {why}", path.display())));
     }
     Ok(Some(stored))
 }
 
+/// What a preparation goes by: the recipe's keys and the checksums of the files they name.
+pub fn provenance(recipe: &dyn Recipe) -> Result<Option<toml::Table>, Failure> {
+    let Some(mut keys) = recipe.provenance()? else {
+        return Ok(None);
+    };
+    let sums = checksums_of(grain_inputs(&keys))?;
+    if !sums.is_empty() {
+        keys.insert("contents".into(), sums.into());
+    }
+    Ok(Some(keys))
+}
+
 /// Why a packing is not the one a scene asks for.
-fn mismatch(recipe: &dyn Recipe, materials: &Materials, stored: &Stored) -> Option<String> {
-    let own = recipe.provenance();
+fn mismatch(
+    recipe: &dyn Recipe,
+    materials: &Materials,
+    stored: &Stored,
+) -> Result<Option<String>, Failure> {
+    let own = provenance(recipe)?;
     let differing = own.map_or_else(Vec::new, |own| differing_keys(&stored.provenance, &own, ""));
     if !differing.is_empty() {
-        return Some(format!(
+        return Ok(Some(format!(
             "it was made by another recipe; differing: {}",
             differing.join(", ")
-        ));
+        )));
     }
     // Numbers of materials stand for names.
     let known = materials.names.starts_with(&stored.materials)
         || stored.materials.starts_with(&materials.names);
-    (!known).then(|| {
+    Ok((!known).then(|| {
         format!(
             "its materials are {}, those of the scene {}",
             stored.materials.join(", "),
             materials.names.join(", ")
         )
-    })
+    }))
 }
 
 /// Keeps a packing under the name that its scene gives it, if it gives one.
