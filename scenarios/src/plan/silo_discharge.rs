@@ -1,7 +1,7 @@
 //! The plan of a silo that runs out as a continuum.
 
 use super::Lines;
-use crate::run::{self, collapse_ground::words_of};
+use crate::run::{self, collapse_ground::words_of, surface_steps::steps_of};
 use crate::scene::{Scene, SiloDischargeScene};
 
 /// Speeds at the outlet over √(g L), by which the plan counts steps.
@@ -49,7 +49,7 @@ pub(super) fn silo_discharge(
         "time step",
         &format!("about {step:.4e} s (courant {courant}, at most {largest:.4e} s)"),
     );
-    let steps = body.duration_scaled * time / step;
+    let steps = steps_of(body.duration_scaled * time, step);
     lines.say(
         "cost",
         &format!(

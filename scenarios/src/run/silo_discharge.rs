@@ -2,7 +2,7 @@
 
 use super::collapse::options_of;
 use super::collapse_ground::contact;
-use super::surface_fields::SurfaceFields;
+use super::surface_fields::{self, SurfaceFields};
 use super::surface_run::{self, Course, Followed};
 use super::{Findings, Under};
 use crate::failure::Failure;
@@ -11,7 +11,7 @@ use crate::summary::{Quantity, Summary};
 use crate::table::Table;
 use crate::vtkhdf::{Cells, Frame};
 use colluvium_continuum::Error;
-use colluvium_continuum::free_surface::{SurfaceState, SurfaceStep, flowing_shares};
+use colluvium_continuum::free_surface::{SurfaceState, SurfaceStep};
 use colluvium_continuum::rheology::ShearLaw;
 use colluvium_continuum::silo::{Silo, SiloCase};
 use colluvium_continuum::units::Units;
@@ -114,8 +114,8 @@ impl<L: ShearLaw + Clone> Followed<2, 2> for RunningOut<'_, L> {
         self.silo.instant().to_vec()
     }
 
-    fn flowing_shares(&self) -> [f64; 2] {
-        flowing_shares(&self.silo.flow().cell_fields())
+    fn shares(&self) -> [f64; 3] {
+        surface_fields::shares(&self.silo.fields(), &self.scene.rheology)
     }
 
     fn frame(&self) -> Frame {
@@ -253,6 +253,6 @@ fn describe<L: ShearLaw + Clone>(
         "start of the steady window",
     );
     put("steady_to", of(|s| s.to), "s", "end of the steady window");
-    surface_run::describe_shares(summary, course);
+    surface_run::describe_shares(summary, course, &scene.rheology);
     surface_run::describe_steps(summary, flow, course, scene.solver.strain_rate_floor);
 }

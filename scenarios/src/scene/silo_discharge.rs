@@ -1,6 +1,6 @@
 //! Keys of a silo that runs out of a slot in its floor, as a continuum.
 
-use super::collapse::{check_rheology, out_of_range};
+use super::collapse::{check_rheology, check_size_of_grains, out_of_range};
 use super::contact::SurfaceKeys;
 use super::{CollapseSolver, RheologyKeys, SceneError};
 use schemars::JsonSchema;
@@ -78,6 +78,7 @@ impl SiloDischargeScene {
                 ),
             ));
         }
+        check_size_of_grains(&self.rheology, self.height, origin)?;
         check_rheology(&self.rheology, origin)
     }
 }
