@@ -140,12 +140,11 @@ fn a_step_that_fails_changes_nothing() {
     unreachable.solver.max_iterations = 1;
     let mut refused = SurfaceOptions::default();
     refused.solver.floor_factor = 2.0;
-    for options in [unreachable, refused] {
-        let mut collapse = Collapse::new(&case, &options).unwrap();
-        collapse.set_state(before.clone()).unwrap();
-        collapse.step(f64::INFINITY).unwrap_err();
-        assert_eq!(*collapse.flow().state(), before);
-    }
+    assert!(Collapse::new(&case, &refused).is_err());
+    let mut collapse = Collapse::new(&case, &unreachable).unwrap();
+    collapse.set_state(before.clone()).unwrap();
+    collapse.step(f64::INFINITY).unwrap_err();
+    assert_eq!(*collapse.flow().state(), before);
     moving.step(f64::INFINITY).unwrap();
     assert_ne!(*moving.flow().state(), before);
 }

@@ -21,6 +21,8 @@ use std::ops::Range;
 
 /// Cells over ground that miss less of being full count as full.
 const FULL_TO: f64 = 1e-11;
+/// Round-off of fractions that somebody cut out of cells.
+const ROUND_OFF: f64 = 1e-9;
 
 /// Refuses fractions of another number of cells, or out of range.
 pub(super) fn check_fractions(
@@ -228,7 +230,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             }
         }
         let topology = Topology::new(&grid);
-        check_fractions(&fractions, topology.cells(), [0.0, 1.0 + FULL_TO])?;
+        check_fractions(&fractions, topology.cells(), [-ROUND_OFF, 1.0 + ROUND_OFF])?;
         let sliding = SlidingPlaces::new(&grid);
         let state = SurfaceState {
             velocity: std::array::from_fn(|c| vec![0.0; topology.faces(c)]),
