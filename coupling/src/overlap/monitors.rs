@@ -25,8 +25,8 @@ pub struct Monitors {
 /// What the monitors say.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Serialize)]
 pub struct Report {
-    /// Size of the continuum's velocity less that of the grains in the layers beside the handshake surface m, mean in time, over that of
-    /// the grains' velocity; not a number where grains at rest are slipped past. To be below 1 %.
+    /// Velocity of the continuum minus that of the grains at the handshake surface m, over that of the grains, by means with their
+    /// signs; not a number where grains at rest are slipped past. To be below 1 %.
     pub slip: f64,
     /// Shear stress of the grains over that of the continuum at m; none where the continuum has none there but for
     /// round-off, as beside grains that do not act on it. To be within 5 %.
@@ -43,8 +43,8 @@ pub struct Report {
     pub buffer_temperature: f64,
     /// Most grains beyond the edge by more than a cell at any exchange.
     pub escaped: f64,
-    /// Σ |impulse| of the relaxation, layer by layer and exchange by exchange, over that of the shear traction on the edge; not a number
-    /// where there is no traction but a relaxation. To be below 10 %.
+    /// Impulse of relaxation over that of the shear traction on the edge, by sums with their signs; not a number where there is no
+    /// traction but a relaxation. To be below 10 %.
     pub relaxation_share: f64,
 }
 
@@ -70,9 +70,8 @@ impl Monitors {
         self.count += 1.0;
         let m = strip.inner;
         let beside = [&averages.nodes[m - 1], &averages.nodes[m]];
-        // What has two signs must not cancel.
-        self.slip += 0.5 * (beside[0].slip().abs() + beside[1].slip().abs());
-        self.velocity += 0.5 * (beside[0].velocity().abs() + beside[1].velocity().abs());
+        self.slip += 0.5 * (beside[0].slip() + beside[1].slip());
+        self.velocity += 0.5 * (beside[0].velocity() + beside[1].velocity());
         let face = &averages.faces[m];
         let pairs = [
             (&mut self.shear, face.shear, continuum.shear_stress(m)),
@@ -94,8 +93,8 @@ impl Monitors {
             }
         }
         self.escaped = self.escaped.max(escaped as f64);
-        self.relaxation += relaxation.iter().map(|impulse| impulse.abs()).sum::<f64>();
-        self.interface += interface.abs();
+        self.relaxation += relaxation.iter().sum::<f64>();
+        self.interface += interface;
     }
 
     /// Means so far.
@@ -116,7 +115,7 @@ impl Monitors {
             inner_temperature: mean(self.temperature[0]),
             buffer_temperature: mean(self.temperature[1]),
             escaped: self.escaped,
-            relaxation_share: ratio(self.relaxation, self.interface),
+            relaxation_share: ratio(self.relaxation.abs(), self.interface.abs()),
         }
     }
 
