@@ -16,8 +16,7 @@ fn cliff(folder: &Path, name: &str, sets: &[&str]) -> impl Fn(&str) -> f64 + use
     let options = RunOptions {
         out: Some(folder.join(name)),
         threads: Some(1),
-        resume: false,
-        checkpoint_every: None,
+        ..RunOptions::default()
     };
     let ended = run(&scene, &options).unwrap();
     let summary = report::read_summary(&ended.directory).unwrap();

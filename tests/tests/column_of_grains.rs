@@ -24,8 +24,7 @@ fn column(folder: &Path, name: &str, sets: &[&str]) -> impl Fn(&str) -> f64 + us
     let options = RunOptions {
         out: Some(folder.join(name)),
         threads: Some(1),
-        resume: false,
-        checkpoint_every: None,
+        ..RunOptions::default()
     };
     let ended = run(&scene, &options).unwrap();
     let results = report::read_summary(&ended.directory).unwrap().results;

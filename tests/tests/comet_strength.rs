@@ -36,8 +36,7 @@ fn pulled(folder: &Path, name: &str, sets: &[&str]) -> Pulled {
     let options = RunOptions {
         out: Some(folder.join(name)),
         threads: Some(1),
-        resume: false,
-        checkpoint_every: None,
+        ..RunOptions::default()
     };
     let ended = run(&scene, &options).unwrap();
     let summary = report::read_summary(&ended.directory).unwrap();

@@ -197,7 +197,8 @@ fn rolling_down_an_incline() {
             };
             let slope = degrees.to_radians();
             let mut run = resting(law, [0.0; 3], [0.0; 3], 40.0);
-            run.set_gravity(Vector3::new(slope.sin(), 0.0, -slope.cos()) * G);
+            run.set_gravity(Vector3::new(slope.sin(), 0.0, -slope.cos()) * G)
+                .unwrap();
             let a = at(&mut run, 0.2).velocity.x;
             let b = at(&mut run, 0.6).velocity.x;
             if mu_r < slope.tan() {
@@ -252,7 +253,7 @@ fn pull_apart(law: ContactLaw, radius: f64, start: f64, scale: f64, dt: f64, ste
     let (mut tension, mut lost) = (0.0_f64, 0.0);
     for k in 0..steps {
         let pull = 1.2 * scale * k as f64 / steps as f64;
-        run.set_gravity(Vector3::z() * (pull / m));
+        run.set_gravity(Vector3::z() * (pull / m)).unwrap();
         run.advance(20).unwrap();
         let now = look(&mut run);
         let Some(contact) = now.contacts.first() else {

@@ -253,13 +253,17 @@ fn regolith_grains_rest_and_let_go_at_the_force_of_their_cohesion() {
         );
         // Gravity turned round and raised slowly.
         for share in [0.5, 0.8, 0.9, 0.95, 0.98, 0.99] {
-            simulation.set_gravity(Vector3::new(0.0, 0.0, share * pull / mass));
+            simulation
+                .set_gravity(Vector3::new(0.0, 0.0, share * pull / mass))
+                .unwrap();
             simulation.advance(rest).unwrap();
         }
         simulation.snapshot(&mut snapshot);
         let hanging = at(0.01 * pull);
         assert!((snapshot.contacts[0].overlap / hanging - 1.0).abs() < 1e-2);
-        simulation.set_gravity(Vector3::new(0.0, 0.0, 1.01 * pull / mass));
+        simulation
+            .set_gravity(Vector3::new(0.0, 0.0, 1.01 * pull / mass))
+            .unwrap();
         simulation.advance(4 * rest).unwrap();
         simulation.snapshot(&mut snapshot);
         assert!(snapshot.contacts.is_empty(), "it should have let go");
