@@ -221,7 +221,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
                 match axis.boundary_at(face) {
                     Some(Boundary::CoulombWall { friction, .. }) => friction.validate()?,
                     wall => require(
-                        !wall.is_some_and(|wall| wall.outer_pressure().is_some()),
+                        wall.is_none_or(|wall| wall.outer_pressure().is_none()),
                         "grid.boundary",
                         face as f64,
                         "walls that stay where they are: the surface moves within the grid",
