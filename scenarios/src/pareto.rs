@@ -130,10 +130,9 @@ impl Comparison {
             beside,
         } = self.run_all(directory, threads)?;
         let table = self.table(&rows);
-        directory.write_table(&table)?;
-        if let Some(table) = ends(reference.as_ref(), beside.as_ref()) {
-            directory.write_table(&table)?;
-        }
+        let ends = ends(reference.as_ref(), beside.as_ref());
+        let tables: Vec<&Table> = [&table].into_iter().chain(&ends).collect();
+        directory.write_tables(&tables)?;
         let mut summary = Summary::begun(&self.scene.name, "pareto");
         summary.status = Status::Done;
         summary.cost.wall_s = rows.iter().map(|r| r.wall_s).sum();

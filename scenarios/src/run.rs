@@ -354,9 +354,7 @@ pub fn finish(scene: &Scene, directory: &RunDirectory, findings: Findings) -> Re
         tables,
         grains,
     } = findings;
-    for table in &tables {
-        directory.write_table(table)?;
-    }
+    directory.write_tables(&tables.iter().collect::<Vec<_>>())?;
     let all: Vec<&Table> = tables.iter().chain(&grains).collect();
     results_file::write(&directory.file(run_directory::RESULTS), &scene.name, &all)?;
     summary.status = Status::Done;

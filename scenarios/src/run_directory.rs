@@ -27,6 +27,8 @@ pub const SUMMARY: &str = "summary.json";
 pub const REPORT: &str = "report.html";
 /// Name of the results.
 pub const RESULTS: &str = "results.h5";
+/// The units of the columns of all CSV tables.
+pub const UNITS: &str = "units.csv";
 /// Name of the last checkpoint.
 pub const CHECKPOINT: &str = "checkpoint.h5";
 /// Name of the one before.
@@ -43,7 +45,8 @@ pub const ANGLES: &str = "angles.json";
 pub const ANIMATION: &str = "animation.gif";
 
 /// Every file that a run, a campaign or a comparison writes.
-const OWN_FILES: [&str; 55] = [
+const OWN_FILES: [&str; 56] = [
+    UNITS,
     ANIMATION,
     SCENE,
     INPUTS,
@@ -281,9 +284,12 @@ impl RunDirectory {
             .map_err(|error| Failure::Run(format!("cannot write {}: {error}", path.display())))
     }
 
-    /// Writes a table as CSV.
-    pub fn write_table(&self, table: &Table) -> Result<(), Failure> {
-        self.write(&format!("{}.csv", table.name), table.to_csv().as_bytes())
+    /// Writes tables as CSV, and the units of their columns.
+    pub fn write_tables(&self, tables: &[&Table]) -> Result<(), Failure> {
+        for table in tables {
+            self.write(&format!("{}.csv", table.name), table.to_csv().as_bytes())?;
+        }
+        self.write(UNITS, Table::units(tables).as_bytes())
     }
 
     /// Writes the summary.

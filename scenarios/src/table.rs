@@ -92,6 +92,20 @@ impl Table {
         text
     }
 
+    /// Which unit each column of tables has, as CSV: file, column, unit.
+    pub fn units(tables: &[&Table]) -> String {
+        let mut text = String::from("file,column,unit\n");
+        for table in tables {
+            for column in &table.columns {
+                text.push_str(&format!(
+                    "{}.csv,{},{}\n",
+                    table.name, column.name, column.unit
+                ));
+            }
+        }
+        text
+    }
+
     /// Reads what [`Table::to_csv`] wrote; units are not in CSV.
     pub fn from_csv(path: &Path) -> Result<Table, csv::Error> {
         let name = path
@@ -125,6 +139,17 @@ fn plain_number(value: f64) -> String {
 #[cfg(test)]
 mod tests {
     use super::*;
+
+    #[test]
+    fn units_stand_beside_the_columns() {
+        let table = Table::new("front")
+            .with("t", "s", vec![])
+            .with("x", "m", vec![]);
+        assert_eq!(
+            Table::units(&[&table]),
+            "file,column,unit\nfront.csv,t,s\nfront.csv,x,m\n"
+        );
+    }
 
     #[test]
     fn csv_reads_back_to_the_bit() {
