@@ -122,9 +122,11 @@ pub const CASES: &[Case] = &[
             "--set",
             "grains.calibrated=none",
             "--set",
-            "rheology.law=barker-gray",
+            "rheology.law=coulomb",
+            "--set",
+            "rheology.viscosity=1",
         ],
-        &["rheology.law", "barker-gray", "mu-i with model"],
+        &["rheology.law", "coulomb", "mu-i with model"],
     ),
     (
         &["run", "column-collapse", "--set", "height=1e-3"],
