@@ -45,7 +45,7 @@ pub const ANGLES: &str = "angles.json";
 pub const ANIMATION: &str = "animation.gif";
 
 /// Every file that a run, a campaign or a comparison writes.
-const OWN_FILES: [&str; 56] = [
+const OWN_FILES: [&str; 57] = [
     UNITS,
     ANIMATION,
     SCENE,
@@ -82,6 +82,7 @@ const OWN_FILES: [&str; 56] = [
     "steps.csv",
     "front.csv",
     "deposit.csv",
+    "discharge.csv",
     "profiles.csv",
     "flowing.csv",
     "balance.csv",
@@ -391,7 +392,7 @@ fn refuse_unfinished(path: &Path) -> Result<(), Failure> {
     let saved = SAVED.iter().find(|name| path.join(name).exists());
     match saved {
         Some(saved) if summary["status"] != "done" => Err(Failure::Input(format!(
-            "--out {}: holds a run of `{}` that is not finished and can be gone on with ({saved}); allowed: --resume to go on with it, --overwrite of `run` and `calibrate` to give it up, or another directory",
+            "--out {}: holds a run of `{}` that is not finished and can be gone on with ({saved}); allowed: --resume to go on with it (if this version wrote it), --overwrite of `run` and `calibrate` to give it up, or another directory",
             path.display(),
             summary["scene"].as_str().unwrap_or("another scene"),
         ))),

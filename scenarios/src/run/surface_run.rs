@@ -310,7 +310,7 @@ pub(super) fn describe_shares(summary: &mut Summary, course: &Course, law: &Rheo
     );
     summary.put(
         "largest_ill_posed_share",
-        largest(1).from("of the volume: flows where short waves grow without bound, C(I) > 0"),
+        largest(1).from("of the volume: flows where short waves grow without bound"),
     );
     let Some([_, fastest]) = law.valid_inertial_numbers() else {
         return;

@@ -16,6 +16,9 @@ pub const LOCK: &str = "run.lock";
 /// Directories that this process holds.
 static HELD: Mutex<Vec<PathBuf>> = Mutex::new(Vec::new());
 
+/// ENOLCK of Linux: no locks available, as on a network file system without a lock daemon.
+const NO_LOCKS: i32 = 37;
+
 /// A directory that nobody else writes in.
 #[derive(Debug)]
 pub struct Hold {
@@ -51,7 +54,9 @@ impl Hold {
                 )));
             }
             // Some network file systems know no locks: there nothing is guarded.
-            Err(TryLockError::Error(error)) if error.kind() == ErrorKind::Unsupported => {}
+            Err(TryLockError::Error(error))
+                if error.kind() == ErrorKind::Unsupported
+                    || error.raw_os_error() == Some(NO_LOCKS) => {}
             Err(TryLockError::Error(error)) => return Err(unwritable(error)),
         }
         file.set_len(0)
