@@ -250,7 +250,7 @@ impl SparseSystem {
     /// Makes the numerical factors of the present coefficients.
     ///
     /// # Errors
-    /// [`Error::LinearSolver`] if the matrix is singular or memory runs out.
+    /// [`Error::Singular`] if the matrix is singular, [`Error::LinearSolver`] if memory runs out.
     pub fn factorise(&mut self) -> Result<(), Error> {
         if let Some(iterative) = &mut self.iterative
             && let Some(multigrid) = &mut iterative.multigrid
@@ -322,7 +322,7 @@ impl SparseSystem {
     /// Solves for one right-hand side, to a relative residual `tolerance` where it is solved iteratively.
     ///
     /// # Errors
-    /// [`Error::LinearSolver`] if there are no factors or the solution is not finite.
+    /// [`Error::LinearSolver`] if there are no factors, [`Error::Singular`] if the solution is not finite.
     pub fn solve(
         &mut self,
         right_hand_side: &[f64],
