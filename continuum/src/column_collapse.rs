@@ -50,6 +50,19 @@ const FEWEST_CELLS: f64 = 4.0;
 const REST_SPEED: f64 = 5.0;
 
 impl<L> CollapseCase<L> {
+    /// The same column of another material.
+    pub fn with_law<M>(self, rheology: M) -> CollapseCase<M> {
+        CollapseCase {
+            aspect: self.aspect,
+            height: self.height,
+            gravity: self.gravity,
+            rheology,
+            cells: self.cells,
+            length_scaled: self.length_scaled,
+            overhang_degrees: self.overhang_degrees,
+        }
+    }
+
     /// Width L = H/a of the column (m).
     pub fn width(&self) -> f64 {
         self.height / self.aspect

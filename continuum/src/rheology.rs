@@ -7,8 +7,9 @@
 //!
 //! The laws, one file each: [`MuI`] with or without cohesion, [`Coulomb`] with its limits Bingham and
 //! von Mises, [`BarkerGray`], which is well posed where μ(I) is not, and [`FrictionTable`] for
-//! measured points. [`ShearLaw`] is what a law adds to have exact solutions.
+//! measured points; [`AnyLaw`] is whichever of them a file names. [`ShearLaw`] is what a law adds to have exact solutions.
 
+mod any_law;
 mod barker_gray;
 mod coulomb;
 mod friction;
@@ -17,6 +18,7 @@ pub(crate) mod shear_law;
 mod table;
 mod well_posedness;
 
+pub use any_law::AnyLaw;
 pub use barker_gray::BarkerGray;
 pub use coulomb::Coulomb;
 pub use mu_i::MuI;

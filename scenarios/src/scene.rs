@@ -74,7 +74,6 @@ pub use cylinder_of_grains::{GrainCylinderGrid, GrainCylinderKeys, GrainCylinder
 pub use cylinder_terrain::ReliefKeys;
 pub use error::SceneError;
 pub use family::SceneBody;
-pub use friction_law::LawVisitor;
 pub use grain_intervals::GrainIntervals;
 pub use grains::GrainsScene;
 pub use ground_source::GroundSource;
@@ -87,7 +86,7 @@ pub use kinds::{Kind, inputs as grain_inputs};
 pub use law::{
     CohesionKind, LawKeys, LeverKind, MemoryKind, NormalKind, Parts, RollingKind, TangentialKind,
 };
-pub use layer_case::{LayerCase, LayerVisitor};
+pub use layer_case::LayerCase;
 pub use open_chute::{AcrossKeys, InflowKeys, OpenChuteGrid, OpenChuteScene};
 pub use overlap::{InclineModel, NormalMotionKind, OverlapKeys};
 pub use settle::{SettleFloor, SettleGrains, SettleScene};

@@ -3,11 +3,10 @@
 use super::steady_layer::{self, failure, options};
 use super::{Findings, Under};
 use crate::failure::Failure;
-use crate::scene::{BagnoldScene, LayerCase, LayerVisitor, Scene, SolverKeys};
+use crate::scene::{BagnoldScene, LayerCase, Scene};
 use crate::summary::{Quantity, Summary};
-use colluvium_continuum::bagnold::{BagnoldCase, BagnoldSolution};
+use colluvium_continuum::bagnold::BagnoldSolution;
 use colluvium_continuum::layer::Progress;
-use colluvium_continuum::rheology::ShearLaw;
 use std::ops::ControlFlow;
 use std::time::Instant;
 
@@ -43,8 +42,7 @@ pub(super) fn check(scene: &Scene, body: &BagnoldScene) -> Result<(), Failure> {
 
 pub(super) fn run(scene: &BagnoldScene, under: &mut Under) -> Result<Findings, Failure> {
     let layer = LayerCase::of(scene).map_err(failure)?;
-    let solver = &scene.solver;
-    let solution = layer.visit(SteadyFlow { solver, under })?;
+    let solution = steady_layer::march(&layer.0, &scene.solver, under)?;
     let mut summary = Summary::begun("bagnold", "run");
     describe(&mut summary, scene, &solution, under.wall_s())?;
     Ok(Findings {
@@ -52,20 +50,6 @@ pub(super) fn run(scene: &BagnoldScene, under: &mut Under) -> Result<Findings, F
         tables: steady_layer::tables(&solution),
         grains: None,
     })
-}
-
-/// The march under whatever law.
-struct SteadyFlow<'a, 'u, 'v> {
-    solver: &'a SolverKeys,
-    under: &'v mut Under<'u>,
-}
-
-impl LayerVisitor for SteadyFlow<'_, '_, '_> {
-    type Output = Result<BagnoldSolution, Failure>;
-
-    fn visit<L: ShearLaw>(self, case: &BagnoldCase<L>) -> Self::Output {
-        steady_layer::march(case, self.solver, self.under)
-    }
 }
 
 /// Fills a summary from a solution.

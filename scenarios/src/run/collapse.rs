@@ -6,16 +6,14 @@ use super::surface_fields::{self, SurfaceFields, field};
 use super::surface_run::{self, Course, Deposit, Followed, yields};
 use super::{Findings, Under, channel, collapse_ground, joined_column, world};
 use crate::failure::Failure;
-use crate::scene::{
-    CollapseModel, CollapseScene, CollapseSolver, LawVisitor, Scene, ThinLayerKind,
-};
+use crate::scene::{CollapseModel, CollapseScene, CollapseSolver, Scene, ThinLayerKind};
 use crate::summary::{Quantity, Summary};
 use crate::table::Table;
 use crate::vtkhdf::{Cells, Frame, Values};
 use colluvium_continuum::Error;
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
 use colluvium_continuum::free_surface::{SurfaceOptions, SurfaceState, SurfaceStep, ThinLayer};
-use colluvium_continuum::rheology::ShearLaw;
+use colluvium_continuum::rheology::AnyLaw;
 use colluvium_continuum::units::Units;
 use colluvium_continuum::wall_friction::{SideWalls, WallFriction};
 
@@ -89,40 +87,21 @@ pub(super) fn check(scene: &Scene, body: &CollapseScene) -> Result<(), Failure> 
     if let Some(case) = channel::case(body) {
         return case.validate().map_err(named);
     }
-    let check = Check {
-        scene: body,
-        origin: &scene.origin,
-    };
-    body.rheology.visit_law(check).map_err(named)?
-}
-
-/// Checks the case with its law.
-struct Check<'a> {
-    scene: &'a CollapseScene,
-    origin: &'a str,
-}
-
-impl LawVisitor for Check<'_> {
-    type Output = Result<(), Failure>;
-
-    fn visit<L: ShearLaw + Clone>(self, law: L) -> Self::Output {
-        let case = case(self.scene, law);
-        case.validate()
-            .map_err(|error| Failure::Input(format!("{}: {error}", self.origin)))?;
-        // Ground shows whether it fits when the grid is cut.
-        if self.scene.terrain.is_some() {
-            begun(&case, self.scene, self.origin)?;
-        }
-        Ok(())
+    let case = case(body, body.rheology.any_law().map_err(named)?);
+    case.validate().map_err(named)?;
+    // Ground shows whether it fits when the grid is cut.
+    if body.terrain.is_some() {
+        begun(&case, body, &scene.origin)?;
     }
+    Ok(())
 }
 
 /// The column before it is let go.
-fn begun<L: ShearLaw + Clone>(
-    case: &CollapseCase<L>,
+fn begun(
+    case: &CollapseCase<AnyLaw>,
     scene: &CollapseScene,
     origin: &str,
-) -> Result<Collapse<L>, Failure> {
+) -> Result<Collapse<AnyLaw>, Failure> {
     let (options, walls) = (options(scene), walls(scene));
     match (collapse_ground::ground(scene, origin)?, walls) {
         (Some(ground), walls) => Collapse::over_ground(case, &options, &ground, walls),
@@ -133,12 +112,12 @@ fn begun<L: ShearLaw + Clone>(
 }
 
 /// A collapse as a run follows it.
-struct Falling<'a, L> {
-    collapse: Collapse<L>,
+struct Falling<'a> {
+    collapse: Collapse<AnyLaw>,
     scene: &'a CollapseScene,
 }
 
-impl<L: ShearLaw + Clone> Followed<2, 2> for Falling<'_, L> {
+impl Followed<2, 2> for Falling<'_> {
     fn units(&self) -> &Units {
         self.collapse.units()
     }
@@ -209,32 +188,9 @@ pub(super) fn run(scene: &CollapseScene, under: &mut Under) -> Result<Findings, 
     if scene.channel().is_some() {
         return channel::run(scene, under);
     }
-    let origin = under.scene.origin.clone();
-    let law = &scene.rheology;
-    law.visit_law(Run { scene, under })
-        .map_err(|error| Failure::Input(format!("{origin}: {error}")))?
-}
-
-/// Computes the collapse of a material with its law.
-struct Run<'a, 'b, 'c> {
-    scene: &'a CollapseScene,
-    under: &'b mut Under<'c>,
-}
-
-impl LawVisitor for Run<'_, '_, '_> {
-    type Output = Result<Findings, Failure>;
-
-    fn visit<L: ShearLaw + Clone>(self, law: L) -> Self::Output {
-        continuum(&case(self.scene, law), self.scene, self.under)
-    }
-}
-
-fn continuum<L: ShearLaw + Clone>(
-    case: &CollapseCase<L>,
-    scene: &CollapseScene,
-    under: &mut Under,
-) -> Result<Findings, Failure> {
-    let collapse = begun(case, scene, &under.scene.origin)?;
+    let law = scene.rheology.any_law();
+    let law = law.map_err(|error| Failure::Input(format!("{}: {error}", under.scene.origin)))?;
+    let collapse = begun(&case(scene, law), scene, &under.scene.origin)?;
     let end = scene.duration_scaled * collapse.units().time();
     let mut falling = Falling { collapse, scene };
     let course = surface_run::follow(&mut falling, end, under)?;
@@ -251,7 +207,7 @@ fn continuum<L: ShearLaw + Clone>(
 
 /// Cells with material as quadrilaterals in the plane y = 0, then the ground under each column of cells
 /// if there is any.
-fn fields<L: ShearLaw + Clone>(scene: &CollapseScene, collapse: &Collapse<L>) -> Frame {
+fn fields(scene: &CollapseScene, collapse: &Collapse<AnyLaw>) -> Frame {
     let cells = collapse.fields();
     let grains = &scene.rheology;
     let outline = collapse.ground_outline();
@@ -276,7 +232,7 @@ fn fields<L: ShearLaw + Clone>(scene: &CollapseScene, collapse: &Collapse<L>) ->
     frame
 }
 
-fn tables<L: ShearLaw + Clone>(collapse: &Collapse<L>, course: &Course) -> Vec<Table> {
+fn tables(collapse: &Collapse<AnyLaw>, course: &Course) -> Vec<Table> {
     let (x, h) = collapse.profile();
     // On ground, its height beside the depth of the material on it.
     let on_ground = |table: Table| {
@@ -298,7 +254,7 @@ fn tables<L: ShearLaw + Clone>(collapse: &Collapse<L>, course: &Course) -> Vec<T
     ]
 }
 
-fn describe<L: ShearLaw + Clone>(summary: &mut Summary, falling: &Falling<L>, course: &Course) {
+fn describe(summary: &mut Summary, falling: &Falling, course: &Course) {
     let Falling { collapse, scene } = falling;
     summary.remarks.extend(scene.rheology.remarks());
     let last = course.last().unwrap_or(&[0.0; 3]);

@@ -7,14 +7,14 @@ use super::surface_fields::{self, SurfaceFields};
 use super::surface_run::{self, Course, Followed};
 use super::{Findings, Under};
 use crate::failure::Failure;
-use crate::scene::{LawVisitor, OpenChuteScene, Scene};
+use crate::scene::{OpenChuteScene, Scene};
 use crate::summary::{Quantity, Summary};
 use crate::table::Table;
 use crate::vtkhdf::{Cells, Frame};
 use colluvium_continuum::Error;
 use colluvium_continuum::free_surface::{SurfaceOptions, SurfaceState, SurfaceStep};
 use colluvium_continuum::open_chute::{Across, Feed, OpenChute, OpenChuteCase, Sides, SpaceChute};
-use colluvium_continuum::rheology::ShearLaw;
+use colluvium_continuum::rheology::AnyLaw;
 use colluvium_continuum::units::Units;
 
 /// What the continuum leaves out.
@@ -80,34 +80,14 @@ pub fn options(scene: &OpenChuteScene) -> SurfaceOptions {
     }
 }
 
-/// Checks the case, and says how fast the surface of what enters is (m/s).
-struct Check<'a> {
-    scene: &'a OpenChuteScene,
-    origin: &'a str,
-}
-
-impl LawVisitor for Check<'_> {
-    type Output = Result<f64, Failure>;
-
-    fn visit<L: ShearLaw + Clone>(self, law: L) -> Self::Output {
-        let case = case(self.scene, law);
-        let across = across(self.scene).map_or(Ok(()), |across| across.validate());
-        case.validate()
-            .and(across)
-            .map_err(|error| Failure::Input(format!("{}: {error}", self.origin)))?;
-        Ok(case.speed(case.depth))
-    }
-}
-
 /// Speed of the surface of what enters (m/s).
 pub fn entering_speed(scene: &Scene, body: &OpenChuteScene) -> Result<f64, Failure> {
     let named =
         |error: colluvium_continuum::Error| Failure::Input(format!("{}: {error}", scene.origin));
-    let check = Check {
-        scene: body,
-        origin: &scene.origin,
-    };
-    body.rheology.visit_law(check).map_err(named)?
+    let case = case(body, body.rheology.any_law().map_err(named)?);
+    let across = across(body).map_or(Ok(()), |across| across.validate());
+    case.validate().and(across).map_err(named)?;
+    Ok(case.speed(case.depth))
 }
 
 /// Checks the case and the settings before anything is written.
@@ -119,8 +99,8 @@ pub(super) fn check(scene: &Scene, body: &OpenChuteScene) -> Result<(), Failure>
 }
 
 /// A chute as a run follows it.
-struct Fed<'a, L: ShearLaw + Clone, const D: usize, const C: usize, const V: usize> {
-    chute: OpenChute<L, D, C, V>,
+struct Fed<'a, const D: usize, const C: usize, const V: usize> {
+    chute: OpenChute<AnyLaw, D, C, V>,
     scene: &'a OpenChuteScene,
 }
 
@@ -132,7 +112,7 @@ trait Shown {
     fn asymmetry(&self) -> Option<f64>;
 }
 
-impl<L: ShearLaw + Clone> Shown for OpenChute<L> {
+impl Shown for OpenChute<AnyLaw> {
     fn frame(&self, inertia: f64) -> Frame {
         let cells = self.fields();
         let fields = SurfaceFields::of_material(&cells, inertia);
@@ -149,7 +129,7 @@ impl<L: ShearLaw + Clone> Shown for OpenChute<L> {
     }
 }
 
-impl<L: ShearLaw + Clone> Shown for SpaceChute<L> {
+impl Shown for SpaceChute<AnyLaw> {
     fn frame(&self, inertia: f64) -> Frame {
         let cells = self.fields();
         let fields = SurfaceFields::of_material(&cells, inertia);
@@ -161,10 +141,9 @@ impl<L: ShearLaw + Clone> Shown for SpaceChute<L> {
     }
 }
 
-impl<L: ShearLaw + Clone, const D: usize, const C: usize, const V: usize> Followed<D, C>
-    for Fed<'_, L, D, C, V>
+impl<const D: usize, const C: usize, const V: usize> Followed<D, C> for Fed<'_, D, C, V>
 where
-    OpenChute<L, D, C, V>: Shown,
+    OpenChute<AnyLaw, D, C, V>: Shown,
 {
     fn units(&self) -> &Units {
         self.chute.units()
@@ -217,45 +196,29 @@ where
 
 pub(super) fn run(scene: &OpenChuteScene, under: &mut Under) -> Result<Findings, Failure> {
     let origin = under.scene.origin.clone();
-    let law = &scene.rheology;
-    law.visit_law(Run { scene, under })
-        .map_err(|error| Failure::Input(format!("{origin}: {error}")))?
-}
-
-/// Computes the flow of a material with its law.
-struct Run<'a, 'b, 'c> {
-    scene: &'a OpenChuteScene,
-    under: &'b mut Under<'c>,
-}
-
-impl LawVisitor for Run<'_, '_, '_> {
-    type Output = Result<Findings, Failure>;
-
-    fn visit<L: ShearLaw + Clone>(self, law: L) -> Self::Output {
-        let (scene, under) = (self.scene, self.under);
-        let (case, options) = (case(scene, law), options(scene));
-        let refused = |error: Error| Failure::Input(format!("{}: {error}", under.scene.origin));
-        match across(scene) {
-            None => {
-                let chute = OpenChute::new(&case, &options).map_err(refused)?;
-                flow(chute, &case, scene, under)
-            }
-            Some(across) => {
-                let chute = SpaceChute::in_space(&case, &across, &options).map_err(refused)?;
-                flow(chute, &case, scene, under)
-            }
+    let refused = |error: Error| Failure::Input(format!("{origin}: {error}"));
+    let law = scene.rheology.any_law().map_err(refused)?;
+    let (case, options) = (case(scene, law), options(scene));
+    match across(scene) {
+        None => {
+            let chute = OpenChute::new(&case, &options).map_err(refused)?;
+            flow(chute, &case, scene, under)
+        }
+        Some(across) => {
+            let chute = SpaceChute::in_space(&case, &across, &options).map_err(refused)?;
+            flow(chute, &case, scene, under)
         }
     }
 }
 
-fn flow<L: ShearLaw + Clone, const D: usize, const C: usize, const V: usize>(
-    chute: OpenChute<L, D, C, V>,
-    case: &OpenChuteCase<L>,
+fn flow<const D: usize, const C: usize, const V: usize>(
+    chute: OpenChute<AnyLaw, D, C, V>,
+    case: &OpenChuteCase<AnyLaw>,
     scene: &OpenChuteScene,
     under: &mut Under,
 ) -> Result<Findings, Failure>
 where
-    OpenChute<L, D, C, V>: Shown,
+    OpenChute<AnyLaw, D, C, V>: Shown,
 {
     let end = scene.duration_scaled * chute.units().time();
     let mut fed = Fed { chute, scene };
@@ -271,9 +234,9 @@ where
     })
 }
 
-fn tables<L: ShearLaw + Clone, const D: usize, const C: usize, const V: usize>(
-    case: &OpenChuteCase<L>,
-    chute: &OpenChute<L, D, C, V>,
+fn tables<const D: usize, const C: usize, const V: usize>(
+    case: &OpenChuteCase<AnyLaw>,
+    chute: &OpenChute<AnyLaw, D, C, V>,
     course: &Course,
 ) -> Vec<Table> {
     let (z, u) = chute.speeds();
@@ -295,13 +258,13 @@ fn tables<L: ShearLaw + Clone, const D: usize, const C: usize, const V: usize>(
     ]
 }
 
-fn describe<L: ShearLaw + Clone, const D: usize, const C: usize, const V: usize>(
+fn describe<const D: usize, const C: usize, const V: usize>(
     summary: &mut Summary,
-    case: &OpenChuteCase<L>,
-    fed: &Fed<L, D, C, V>,
+    case: &OpenChuteCase<AnyLaw>,
+    fed: &Fed<D, C, V>,
     course: &Course,
 ) where
-    OpenChute<L, D, C, V>: Shown,
+    OpenChute<AnyLaw, D, C, V>: Shown,
 {
     let Fed { chute, scene } = fed;
     summary.remarks.extend(scene.rheology.remarks());

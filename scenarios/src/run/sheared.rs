@@ -3,10 +3,9 @@
 use super::steady_layer::{self, failure};
 use super::{Findings, Under};
 use crate::failure::Failure;
-use crate::scene::{ExactFlow, LawVisitor, Scene, ShearedCase, ShearedScene};
+use crate::scene::{ExactFlow, Scene, ShearedCase, ShearedScene};
 use crate::summary::{Quantity, Summary};
 use colluvium_continuum::layer::LayerSolution;
-use colluvium_continuum::rheology::ShearLaw;
 
 /// What such a flow leaves out.
 pub const LEFT_OUT: [&str; 5] = [
@@ -26,8 +25,12 @@ pub(super) fn check(scene: &Scene, body: &ShearedScene) -> Result<(), Failure> {
 
 pub(super) fn run(scene: &ShearedScene, under: &mut Under) -> Result<Findings, Failure> {
     let exact = scene.exact().map_err(failure)?;
-    let march = March { scene, under };
-    let solution = scene.rheology().visit_law(march).map_err(failure)??;
+    let law = scene.rheology().any_law().map_err(failure)?;
+    let solver = scene.solver();
+    let solution = match scene.case(law) {
+        ShearedCase::PlaneShear(case) => steady_layer::march(&case, solver, under),
+        ShearedCase::VerticalChute(case) => steady_layer::march(&case, solver, under),
+    }?;
     let mut summary = Summary::begun(scene.name(), "run");
     describe(&mut summary, scene, &exact, &solution, under.wall_s());
     Ok(Findings {
@@ -35,24 +38,6 @@ pub(super) fn run(scene: &ShearedScene, under: &mut Under) -> Result<Findings, F
         tables: steady_layer::tables(&solution),
         grains: None,
     })
-}
-
-/// The march under whatever law.
-struct March<'a, 'u, 'v> {
-    scene: &'a ShearedScene,
-    under: &'v mut Under<'u>,
-}
-
-impl LawVisitor for March<'_, '_, '_> {
-    type Output = Result<LayerSolution, Failure>;
-
-    fn visit<L: ShearLaw + Clone>(self, law: L) -> Self::Output {
-        let solver = self.scene.solver();
-        match self.scene.case(law) {
-            ShearedCase::PlaneShear(case) => steady_layer::march(&case, solver, self.under),
-            ShearedCase::VerticalChute(case) => steady_layer::march(&case, solver, self.under),
-        }
-    }
 }
 
 /// Fills a summary from a solution.

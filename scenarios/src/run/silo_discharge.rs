@@ -6,13 +6,13 @@ use super::surface_fields::{self, SurfaceFields};
 use super::surface_run::{self, Course, Followed};
 use super::{Findings, Under};
 use crate::failure::Failure;
-use crate::scene::{LawVisitor, Scene, SiloDischargeScene};
+use crate::scene::{Scene, SiloDischargeScene};
 use crate::summary::{Quantity, Summary};
 use crate::table::Table;
 use crate::vtkhdf::{Cells, Frame};
 use colluvium_continuum::Error;
 use colluvium_continuum::free_surface::{SurfaceState, SurfaceStep};
-use colluvium_continuum::rheology::ShearLaw;
+use colluvium_continuum::rheology::AnyLaw;
 use colluvium_continuum::silo::{Silo, SiloCase};
 use colluvium_continuum::units::Units;
 
@@ -41,24 +41,11 @@ fn case<L>(scene: &SiloDischargeScene, rheology: L) -> SiloCase<L> {
     }
 }
 
-/// Checks the case with its law.
-struct Check<'a>(&'a SiloDischargeScene);
-
-impl LawVisitor for Check<'_> {
-    type Output = Result<(), Error>;
-
-    fn visit<L: ShearLaw + Clone>(self, law: L) -> Self::Output {
-        case(self.0, law).validate()
-    }
-}
-
 /// The case without its material, once both are found good.
 pub fn shape(scene: &Scene, body: &SiloDischargeScene) -> Result<SiloCase<()>, Failure> {
     let named = |error: Error| Failure::Input(format!("{}: {error}", scene.origin));
-    body.rheology
-        .visit_law(Check(body))
-        .and_then(|good| good)
-        .map_err(named)?;
+    let law = body.rheology.any_law().map_err(named)?;
+    case(body, law).validate().map_err(named)?;
     Ok(case(body, ()))
 }
 
@@ -71,12 +58,12 @@ pub(super) fn check(scene: &Scene, body: &SiloDischargeScene) -> Result<(), Fail
 }
 
 /// A silo as a run follows it.
-struct RunningOut<'a, L: ShearLaw + Clone> {
-    silo: Silo<L>,
+struct RunningOut<'a> {
+    silo: Silo<AnyLaw>,
     scene: &'a SiloDischargeScene,
 }
 
-impl<L: ShearLaw + Clone> Followed<2, 2> for RunningOut<'_, L> {
+impl Followed<2, 2> for RunningOut<'_> {
     fn units(&self) -> &Units {
         self.silo.units()
     }
@@ -132,40 +119,21 @@ impl<L: ShearLaw + Clone> Followed<2, 2> for RunningOut<'_, L> {
 }
 
 pub(super) fn run(scene: &SiloDischargeScene, under: &mut Under) -> Result<Findings, Failure> {
-    let origin = under.scene.origin.clone();
-    scene
-        .rheology
-        .visit_law(Run { scene, under })
-        .map_err(|error| Failure::Input(format!("{origin}: {error}")))?
-}
-
-/// Computes the discharge of a material with its law.
-struct Run<'a, 'b, 'c> {
-    scene: &'a SiloDischargeScene,
-    under: &'b mut Under<'c>,
-}
-
-impl LawVisitor for Run<'_, '_, '_> {
-    type Output = Result<Findings, Failure>;
-
-    fn visit<L: ShearLaw + Clone>(self, law: L) -> Self::Output {
-        let (scene, under) = (self.scene, self.under);
-        let case = case(scene, law);
-        let silo = Silo::new(&case, &options_of(&scene.solver))
-            .map_err(|error| Failure::Input(format!("{}: {error}", under.scene.origin)))?;
-        let end = scene.duration_scaled * silo.units().time();
-        let mut flow = RunningOut { silo, scene };
-        let course = surface_run::follow(&mut flow, end, under)?;
-        let wall_s = under.wall_s();
-        surface_run::join(&flow, end, under)?;
-        let mut summary = surface_run::summary(&flow, &course, &LEFT_OUT, under, wall_s);
-        describe(&mut summary, &case, &flow, &course);
-        Ok(Findings {
-            summary,
-            tables: tables(&course),
-            grains: None,
-        })
-    }
+    let refused = |error: Error| Failure::Input(format!("{}: {error}", under.scene.origin));
+    let case = case(scene, scene.rheology.any_law().map_err(refused)?);
+    let silo = Silo::new(&case, &options_of(&scene.solver)).map_err(refused)?;
+    let end = scene.duration_scaled * silo.units().time();
+    let mut flow = RunningOut { silo, scene };
+    let course = surface_run::follow(&mut flow, end, under)?;
+    let wall_s = under.wall_s();
+    surface_run::join(&flow, end, under)?;
+    let mut summary = surface_run::summary(&flow, &course, &LEFT_OUT, under, wall_s);
+    describe(&mut summary, &case, &flow, &course);
+    Ok(Findings {
+        summary,
+        tables: tables(&course),
+        grains: None,
+    })
 }
 
 /// Instants of time, volume inside and volume that has left.
@@ -198,12 +166,7 @@ fn tables(course: &Course) -> Vec<Table> {
     ]
 }
 
-fn describe<L: ShearLaw + Clone>(
-    summary: &mut Summary,
-    case: &SiloCase<L>,
-    flow: &RunningOut<L>,
-    course: &Course,
-) {
+fn describe(summary: &mut Summary, case: &SiloCase<AnyLaw>, flow: &RunningOut, course: &Course) {
     let RunningOut { silo, scene } = flow;
     summary.remarks.extend(scene.rheology.remarks());
     let mut put = |name: &str, value: f64, unit: &str, source: &str| {

@@ -1,16 +1,8 @@
-//! The law of friction that `[rheology]` describes: where its name becomes a type.
+//! The law of friction that `[rheology]` describes: where its name becomes a law.
 
 use super::bagnold::{FrictionLaw, RheologyKeys};
 use colluvium_continuum::Error;
-use colluvium_continuum::rheology::{BarkerGray, Coulomb, FrictionTable, Grains, MuI, ShearLaw};
-
-/// What is done with a law whatever it is.
-pub trait LawVisitor {
-    /// What comes of it.
-    type Output;
-    /// Does it.
-    fn visit<L: ShearLaw + Clone>(self, law: L) -> Self::Output;
-}
+use colluvium_continuum::rheology::{AnyLaw, BarkerGray, Coulomb, FrictionTable, Grains, MuI};
 
 /// A number that the scene's check has seen to be there, as its law reads it.
 fn number(value: Option<f64>) -> f64 {
@@ -18,16 +10,16 @@ fn number(value: Option<f64>) -> f64 {
 }
 
 impl RheologyKeys {
-    /// Does something with the law.
+    /// The law.
     ///
     /// # Errors
     /// Numbers with which the law means nothing.
-    pub fn visit_law<V: LawVisitor>(&self, visitor: V) -> Result<V::Output, Error> {
+    pub fn any_law(&self) -> Result<AnyLaw, Error> {
         Ok(match self.law {
-            FrictionLaw::MuI => visitor.visit(self.mu_i()),
-            FrictionLaw::Coulomb => visitor.visit(self.coulomb()),
-            FrictionLaw::BarkerGray => visitor.visit(self.barker_gray()?),
-            FrictionLaw::Table => visitor.visit(self.friction_table()?),
+            FrictionLaw::MuI => self.mu_i().into(),
+            FrictionLaw::Coulomb => self.coulomb().into(),
+            FrictionLaw::BarkerGray => self.barker_gray()?.into(),
+            FrictionLaw::Table => self.friction_table()?.into(),
         })
     }
 

@@ -1,11 +1,10 @@
 //! Keys of the flows between plates and between walls that have exact solutions.
 
 use super::bagnold::{BagnoldGrid, RheologyKeys, SolverKeys, check_grid, check_law};
-use super::friction_law::LawVisitor;
 use super::{FrictionLaw, SceneError};
 use colluvium_continuum::Error;
 use colluvium_continuum::plane_shear::PlaneShearCase;
-use colluvium_continuum::rheology::ShearLaw;
+use colluvium_continuum::rheology::{AnyLaw, Rheology, ShearLaw};
 use colluvium_continuum::vertical_chute::VerticalChuteCase;
 use schemars::JsonSchema;
 use serde::{Deserialize, Serialize};
@@ -68,11 +67,11 @@ pub enum ShearedScene {
 }
 
 /// The flow's case, with its law.
-pub enum ShearedCase<L> {
+pub enum ShearedCase {
     /// Between two plates.
-    PlaneShear(PlaneShearCase<L>),
+    PlaneShear(PlaneShearCase<AnyLaw>),
     /// In a vertical chute.
-    VerticalChute(VerticalChuteCase<L>),
+    VerticalChute(VerticalChuteCase<AnyLaw>),
 }
 
 /// What is known of a flow before it is computed.
@@ -193,7 +192,7 @@ impl ShearedScene {
     }
 
     /// The case under a law.
-    pub fn case<L: ShearLaw>(&self, rheology: L) -> ShearedCase<L> {
+    pub fn case(&self, rheology: AnyLaw) -> ShearedCase {
         let (cells, columns) = (self.cells(), self.grid().columns());
         match self {
             ShearedScene::PlaneShear(keys) => ShearedCase::PlaneShear(PlaneShearCase {
@@ -220,7 +219,32 @@ impl ShearedScene {
     /// # Errors
     /// Numbers with which there is no steady flow.
     pub fn exact(&self) -> Result<ExactFlow, Error> {
-        self.rheology().visit_law(Exact(self))?
+        let keys = self.rheology();
+        let law = keys.any_law()?;
+        let (rate, load, velocity, wall_stress, plug) = match self.case(law.clone()) {
+            ShearedCase::PlaneShear(case) => {
+                case.validate()?;
+                let rate = case.wall_velocity / case.gap;
+                let stress = case.exact_shear_stress();
+                (rate, case.load, case.wall_velocity, stress, 0.0)
+            }
+            ShearedCase::VerticalChute(case) => {
+                case.validate()?;
+                let stress = case.exact_shear_stress(case.half_width);
+                let rate = law.rate_under(stress, case.load);
+                let plug = case.plug_half_width();
+                (rate, case.load, case.exact_velocity(0.0), stress, plug)
+            }
+        };
+        Ok(ExactFlow {
+            velocity,
+            wall_stress,
+            wall_inertial_number: rate * keys.diameter * (keys.grain_density / load).sqrt(),
+            well_posed: law.is_well_posed(rate, load),
+            plug,
+            is_rising: law.threshold(1.01 * rate, load).stress
+                > (1.0 + 1e-9) * law.threshold(rate, load).stress,
+        })
     }
 
     pub(super) fn check_together(&self, origin: &str) -> Result<(), SceneError> {
@@ -268,40 +292,5 @@ impl ShearedScene {
             range: "what makes friction grow with the strain rate there: else the velocity between plates is not determined"
                 .into(),
         }
-    }
-}
-
-/// Reads the exact solution under whatever law.
-struct Exact<'a>(&'a ShearedScene);
-
-impl LawVisitor for Exact<'_> {
-    type Output = Result<ExactFlow, Error>;
-
-    fn visit<L: ShearLaw + Clone>(self, law: L) -> Self::Output {
-        let keys = self.0.rheology();
-        let (rate, load, velocity, wall_stress, plug) = match self.0.case(law.clone()) {
-            ShearedCase::PlaneShear(case) => {
-                case.validate()?;
-                let rate = case.wall_velocity / case.gap;
-                let stress = case.exact_shear_stress();
-                (rate, case.load, case.wall_velocity, stress, 0.0)
-            }
-            ShearedCase::VerticalChute(case) => {
-                case.validate()?;
-                let stress = case.exact_shear_stress(case.half_width);
-                let rate = law.rate_under(stress, case.load);
-                let plug = case.plug_half_width();
-                (rate, case.load, case.exact_velocity(0.0), stress, plug)
-            }
-        };
-        Ok(ExactFlow {
-            velocity,
-            wall_stress,
-            wall_inertial_number: rate * keys.diameter * (keys.grain_density / load).sqrt(),
-            well_posed: law.is_well_posed(rate, load),
-            plug,
-            is_rising: law.threshold(1.01 * rate, load).stress
-                > (1.0 + 1e-9) * law.threshold(rate, load).stress,
-        })
     }
 }

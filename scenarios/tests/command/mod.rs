@@ -145,10 +145,21 @@ pub fn shares_say_what_the_summary_says(run: &Path) {
     assert!(most(1) > 0.3, "{}", most(1));
 }
 
-/// Runs `colluvium` in a folder.
+/// Commands that compute.
+const WORK: [&str; 4] = ["run", "calibrate", "validate", "pareto"];
+
+/// Runs `colluvium` in a folder; on one thread where nothing else is asked for, as other tests have the other cores.
 pub fn colluvium(folder: &Path, arguments: &[&str]) -> Output {
+    let works = arguments.first().is_some_and(|first| WORK.contains(first));
+    let one = ["--threads", "1"];
+    let threads = if works && !arguments.contains(&"--threads") {
+        &one[..]
+    } else {
+        &[]
+    };
     Command::new(env!("CARGO_BIN_EXE_colluvium"))
         .args(arguments)
+        .args(threads)
         .current_dir(folder)
         .output()
         .unwrap()

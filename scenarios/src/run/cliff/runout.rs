@@ -10,7 +10,7 @@ use crate::scene::CliffScene;
 use crate::vtkhdf::{Cells, Frame};
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase, CollapseGround, Matter};
 use colluvium_continuum::free_surface::{CellFields, History, SurfaceOptions, SurfaceState};
-use colluvium_continuum::rheology::MuI;
+use colluvium_continuum::rheology::{AnyLaw, MuI};
 use colluvium_continuum::terrain::Profile;
 use colluvium_coupling::debris_ground::{DebrisGround, SurfaceLine};
 use colluvium_coupling::handover::{Debris, Handed, Room};
@@ -21,7 +21,9 @@ const UPRIGHT: f64 = 1e-3;
 
 /// Debris on the move.
 pub struct Runout {
-    collapse: Collapse,
+    collapse: Collapse<AnyLaw>,
+    /// The law in it (SI).
+    law: MuI,
     /// The ground in the coordinates of the grains.
     ground: Profile,
     /// The grid's x = 0 in the coordinates of the grains (m).
@@ -69,7 +71,7 @@ impl Runout {
             aspect: 1.0,
             height,
             gravity: scene.gravity,
-            rheology: law,
+            rheology: law.into(),
             cells: (length / (scene.runout.cell_diameters * d)).round() as usize,
             length_scaled: length / height,
             overhang_degrees: 0.0,
@@ -86,6 +88,7 @@ impl Runout {
         let collapse = Collapse::bare(&case, &options, &ground, height).map_err(failure)?;
         Ok(Self {
             collapse,
+            law,
             ground: own,
             low,
             begun: 0.0,
@@ -123,7 +126,7 @@ impl Runout {
     }
 
     fn debris<'a>(&self, grains: &'a [Grain], reach: f64) -> Debris<'a> {
-        let law = self.law();
+        let law = self.law;
         Debris {
             grains,
             solid_fraction: law.solid_fraction,
@@ -135,7 +138,7 @@ impl Runout {
 
     /// Takes the next instalment at a time (s).
     pub fn join(&mut self, scene: &CliffScene, grains: &[Grain], time: f64) -> Result<(), Failure> {
-        let reach = scene.runout.reach_diameters * self.law().diameter;
+        let reach = scene.runout.reach_diameters * self.law.diameter;
         let state = self.collapse.flow().state();
         let unit = self.collapse.units().velocity;
         let present = Matter {
@@ -153,7 +156,7 @@ impl Runout {
 
     /// Goes on without grains beside it.
     pub fn alone(&self, scene: &CliffScene, origin: &str) -> Result<Self, Failure> {
-        let law = *self.law();
+        let law = self.law;
         let mut runout = Self::bare(scene, origin, law, [self.width, 0.0])?;
         let state = SurfaceState {
             history: History::default(),
@@ -198,7 +201,7 @@ impl Runout {
 
     /// Mass of a whole cell (kg).
     fn cell_mass(&self) -> f64 {
-        let law = self.law();
+        let law = self.law;
         law.grain_density * law.solid_fraction * self.collapse.spacing().powi(2) * self.width
     }
 
@@ -236,7 +239,7 @@ impl Runout {
     /// Matter as parcels: place along x (m) and the volume of grains in it (m³).
     pub fn parcels(&self) -> Vec<[f64; 2]> {
         let (x, h) = self.collapse.profile();
-        let base = self.collapse.spacing() * self.width * self.law().solid_fraction;
+        let base = self.collapse.spacing() * self.width * self.law.solid_fraction;
         x.iter()
             .zip(h)
             .map(|(x, h)| [x + self.low, h * base])
@@ -245,17 +248,13 @@ impl Runout {
 
     /// Mean diameter of the grains that it was (m).
     pub fn diameter(&self) -> f64 {
-        self.law().diameter
+        self.law.diameter
     }
 
     /// Mass (kg).
     pub fn mass(&self) -> f64 {
-        let law = self.law();
+        let law = self.law;
         law.grain_density * law.solid_fraction * self.volume()
-    }
-
-    fn law(&self) -> &MuI {
-        self.collapse.rheology()
     }
 
     /// Kinetic energy (J).
@@ -286,13 +285,13 @@ impl Runout {
             cell.lower[0] += self.low;
             cell.upper[0] += self.low;
         }
-        let law = self.law();
+        let law = self.law;
         frame(&cells, law.diameter * law.grain_density.sqrt(), time)
     }
 
     /// Appends all that it goes on from.
     pub fn write(&self, memory: &mut Vec<f64>) {
-        let law = self.law();
+        let law = self.law;
         let state = self.collapse.flow().state();
         memory.extend([
             law.diameter,

@@ -14,7 +14,7 @@ use crate::scene::CollapseScene;
 use crate::summary::{Figure, Quantity};
 use crate::table::Table;
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
-use colluvium_continuum::rheology::MuI;
+use colluvium_continuum::rheology::{AnyLaw, MuI};
 use std::path::Path;
 
 /// Steps at rest after which a run ends.
@@ -47,13 +47,13 @@ struct Beside<'a> {
 }
 
 impl Beside<'_> {
-    fn case(&self, [mu_s, mu_2, i_0]: [f64; 3], cells: usize) -> CollapseCase {
+    fn case(&self, [mu_s, mu_2, i_0]: [f64; 3], cells: usize) -> CollapseCase<AnyLaw> {
         let scene = self.scene;
         CollapseCase {
             aspect: self.height / scene.width(),
             height: self.height,
             gravity: scene.gravity,
-            rheology: MuI {
+            rheology: AnyLaw::MuI(MuI {
                 mu_s,
                 mu_2,
                 i_0,
@@ -61,7 +61,7 @@ impl Beside<'_> {
                 solid_fraction: self.law.solid_fraction,
                 grain_density: scene.grains.density,
                 cohesion: 0.0,
-            },
+            }),
             cells,
             length_scaled: scene.grid.length_scaled * scene.height / self.height,
             overhang_degrees: scene.overhang_degrees,

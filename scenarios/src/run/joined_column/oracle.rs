@@ -8,6 +8,7 @@ use crate::scene::{CollapseScene, DENSE};
 use crate::summary::Figure;
 use crate::table::Table;
 use colluvium_continuum::column_collapse::{Collapse, CollapseCase};
+use colluvium_continuum::rheology::AnyLaw;
 use colluvium_coupling::zones::{Concern, Markers, Oracle, Survey};
 
 /// Share of all material behind the edge that may be in need of grains.
@@ -41,11 +42,11 @@ pub(super) fn survey(scene: &CollapseScene, origin: &str) -> Result<Option<Surve
     let Some(spec) = column.specs(DENSE)?.into_iter().next() else {
         return Ok(None);
     };
+    let oracle = column.judge(spec.case.rheology)?;
     let case = CollapseCase {
         cells: (scene.cells() / COARSER).max(FEWEST),
-        ..spec.case
+        ..spec.case.with_law(spec.case.rheology.into())
     };
-    let oracle = column.judge(case.rheology)?;
     let markers = follow(&case, scene, &oracle)?;
     let survey = Survey::of(&markers);
     let [least, most] = scene.edge_range(spec.settings.inner + spec.settings.buffer);
@@ -97,7 +98,11 @@ pub(super) fn survey(scene: &CollapseScene, origin: &str) -> Result<Option<Surve
 }
 
 /// Markers at the end of a run of the continuum alone.
-fn follow(case: &CollapseCase, scene: &CollapseScene, oracle: &Oracle) -> Result<Markers, Failure> {
+fn follow(
+    case: &CollapseCase<AnyLaw>,
+    scene: &CollapseScene,
+    oracle: &Oracle,
+) -> Result<Markers, Failure> {
     let failed = |why: colluvium_continuum::Error| Failure::Run(format!("survey of zones: {why}"));
     let mut collapse = Collapse::new(case, &options(scene)).map_err(failed)?;
     let end = scene.duration_scaled * collapse.units().time();
