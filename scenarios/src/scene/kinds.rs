@@ -105,23 +105,15 @@ impl Kind {
     }
 }
 
-/// Dotted paths of files in scenes of grains; `*` stands for any name, or for each of a list.
-const FILES: [&str; 8] = [
-    "bed",
-    "walls.*.file",
-    "walls.*.motion.file",
-    "bodies.*.parts.*.file",
-    "bodies.*.motion.file",
-    "gravity.file",
-    "terrain.heights",
-    "terrain.mesh",
-];
+/// Dotted paths of files in scenes of grains, besides every key `file`.
+const FILES: [&str; 3] = ["bed", "terrain.heights", "terrain.mesh"];
 
 /// Makes relative paths of a scene file relative to that file's folder.
 pub(super) fn anchor(table: &mut toml::Table, folder: &std::path::Path) {
     for path in FILES {
-        anchor_at(table, path, folder);
+        super::layers::anchor_path(table, path, folder);
     }
+    anchor_files(table, folder);
     anchor_packing(table, "packing", folder);
 }
 
@@ -133,21 +125,19 @@ pub(super) fn anchor_packing(table: &mut toml::Table, key: &str, folder: &std::p
     }
 }
 
-fn anchor_at(table: &mut toml::Table, path: &str, folder: &std::path::Path) {
-    match path.split_once(".*.") {
-        Some((head, rest)) => {
-            let inner: Vec<&mut toml::Value> = match table.get_mut(head) {
-                Some(toml::Value::Table(named)) => named.iter_mut().map(|(_, v)| v).collect(),
-                Some(toml::Value::Array(listed)) => listed.iter_mut().collect(),
-                _ => Vec::new(),
-            };
-            for inner in inner {
-                if let toml::Value::Table(inner) = inner {
-                    anchor_at(inner, rest, folder);
+/// Every `file` of a table and of the tables in it.
+fn anchor_files(table: &mut toml::Table, folder: &std::path::Path) {
+    super::layers::anchor_path(table, "file", folder);
+    for (_, value) in table.iter_mut() {
+        match value {
+            toml::Value::Table(inner) => anchor_files(inner, folder),
+            toml::Value::Array(listed) => {
+                for inner in listed.iter_mut().filter_map(toml::Value::as_table_mut) {
+                    anchor_files(inner, folder);
                 }
             }
+            _ => {}
         }
-        None => super::layers::anchor_path(table, path, folder),
     }
 }
 
@@ -155,28 +145,57 @@ fn anchor_at(table: &mut toml::Table, path: &str, folder: &std::path::Path) {
 pub fn inputs(table: &toml::Table) -> Vec<std::path::PathBuf> {
     let mut found = Vec::new();
     for path in FILES {
-        gather(table, path, &mut found);
+        let file = super::layers::get(table, path).and_then(toml::Value::as_str);
+        found.extend(file.map(Into::into));
     }
+    gather_files(table, &mut found);
     let packing = table.get("packing").and_then(toml::Value::as_str);
     found.extend(packing.filter(|s| s.ends_with(".h5")).map(Into::into));
     found
 }
 
-fn gather(table: &toml::Table, path: &str, into: &mut Vec<std::path::PathBuf>) {
-    match path.split_once(".*.") {
-        Some((head, rest)) => {
-            let inner: Vec<&toml::Value> = match table.get(head) {
-                Some(toml::Value::Table(named)) => named.values().collect(),
-                Some(toml::Value::Array(listed)) => listed.iter().collect(),
-                _ => Vec::new(),
-            };
-            for inner in inner.into_iter().filter_map(toml::Value::as_table) {
-                gather(inner, rest, into);
+fn gather_files(table: &toml::Table, into: &mut Vec<std::path::PathBuf>) {
+    for (key, value) in table {
+        match value {
+            toml::Value::String(file) if key == "file" => into.push(file.into()),
+            toml::Value::Table(inner) => gather_files(inner, into),
+            toml::Value::Array(listed) => {
+                for inner in listed.iter().filter_map(toml::Value::as_table) {
+                    gather_files(inner, into);
+                }
             }
+            _ => {}
         }
-        None => {
-            let file = super::layers::get(table, path).and_then(toml::Value::as_str);
-            into.extend(file.map(Into::into));
-        }
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+
+    #[test]
+    fn files_are_found_at_any_depth_and_lie_beside_their_scene() {
+        let mut table: toml::Table = r#"
+            packing = "named"
+            [terrain]
+            heights = "hill.asc"
+            [boundaries.motion]
+            file = "box.csv"
+            [walls.drum.motion]
+            file = "/abroad/drum.csv"
+            [[prepare]]
+            do = "put"
+            file = "grains.csv"
+            within = [{ kind = "any", of = [{ kind = "mesh", file = "cone.stl" }] }]
+        "#
+        .parse()
+        .unwrap();
+        anchor(&mut table, std::path::Path::new("/home/scenes"));
+        let mut found = inputs(&table);
+        found.sort();
+        let beside = |name: &str| std::path::Path::new("/home/scenes").join(name);
+        let mut expected = vec!["/abroad/drum.csv".into()];
+        expected.extend(["box.csv", "cone.stl", "grains.csv", "hill.asc"].map(beside));
+        assert_eq!(found, expected);
     }
 }
