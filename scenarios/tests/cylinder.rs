@@ -36,8 +36,8 @@ fn cylinder_writes_front_deposit_and_fields() {
     shares_say_what_the_summary_says(&folder.path().join("c"));
     let runout = value(&found, "runout_over_aspect");
     assert!((0.93..1.69).contains(&runout), "{runout}");
-    // The linear systems are solved to 1e-9, and so symmetric is the flow: 2e-12 on this grid.
-    assert!(value(&found, "symmetry_error") < 1e-10);
+    // The linear systems are solved to 1e-12: what is left is round-off, which the flow amplifies.
+    assert!(value(&found, "symmetry_error") < 1e-11);
     assert!(value(&found, "volume_error").abs() < 1e-12);
     // In units of √(height/gravity); experiments say 3.
     let time = value(&found, "time_of_rest") / (0.1_f64 / 9.81).sqrt();
@@ -120,7 +120,7 @@ fn cylinder_slides_on_a_floor_of_little_friction() {
         succeed(folder.path(), &[&list[..], &["--set", floor]].concat());
         let found = summary(&folder.path().join(out));
         assert!(value(&found, "volume_error").abs() < 1e-12);
-        assert!(value(&found, "symmetry_error") < 1e-8);
+        assert!(value(&found, "symmetry_error") < 1e-11);
         value(&found, "runout_scaled")
     };
     let rough = runout("rough", "floor.contact=\"no-slip\"");
