@@ -168,12 +168,14 @@ fn show(name: &str, outcome: &Outcome) {
     );
     let r = &outcome.report;
     println!(
-        "  slip {:+.2} %, sigma_D/sigma_C: shear {:.3?}, pressure {:.3?}; escaped {}, relaxation {:.1} % of the traction",
+        "  slip {:.2} % (noise {:.2} %), sigma_D/sigma_C: shear {:.3?}, pressure {:.3?}; escaped {}, relaxation {:.1} % of the traction (noise {:.1} %)",
         100.0 * r.slip,
+        100.0 * r.slip_noise,
         r.shear_ratio,
         r.pressure_ratio,
         r.escaped,
-        100.0 * r.relaxation_share
+        100.0 * r.relaxation_share,
+        100.0 * r.relaxation_noise
     );
 }
 
