@@ -42,7 +42,7 @@ mod shell;
 mod sighting;
 mod start;
 mod strip;
-mod windows;
+pub mod windows;
 
 pub use angular::AngularBook;
 pub use averages::{Averages, FaceStress, Node};
