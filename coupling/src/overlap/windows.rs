@@ -281,7 +281,7 @@ mod tests {
         let places = |k: usize, _: f64| if k.is_multiple_of(2) { 0.05 } else { -0.05 };
         // Signs that change every second window.
         let times = |_: usize, t: f64| {
-            if (t / 80.0) as u64 % 2 == 0 {
+            if ((t / 80.0) as u64).is_multiple_of(2) {
                 0.05
             } else {
                 -0.05
