@@ -23,6 +23,8 @@ pub struct Node {
     pub spin: f64,
     /// Σ m |v′|² (J), about the grains' own mean velocity.
     pub fluctuation: f64,
+    /// Σ (m v′)² along the flow, with the squares of the hats: variance of `momentum` if grains move independently (N² s²).
+    pub variance: f64,
 }
 
 impl Node {
@@ -142,9 +144,12 @@ impl Averages {
         for (grain, s, shares) in inside(sight) {
             let t = sight.edge.tangent(&grain.position);
             let mean = interpolate(&self.velocities, strip.node(0), strip.cell, s);
-            let fluctuation = grain.mass * (grain.velocity - mean * t).norm_squared();
+            let apart = grain.velocity - mean * t;
+            let fluctuation = grain.mass * apart.norm_squared();
+            let along = grain.mass * apart.dot(&t);
             for (k, h) in shares {
                 self.nodes[k].fluctuation += h * fluctuation;
+                self.nodes[k].variance += (h * along).powi(2);
             }
         }
     }

@@ -110,8 +110,9 @@ impl<L: ShearLaw + Copy> Overlap<L> {
             &self.averages,
             &self.continuum,
             (&self.strip, area),
-            (&self.given.relaxation, self.given.shear),
+            &self.given,
             escaped.count(),
+            dt,
         );
         self.given.clear();
         Ok(())

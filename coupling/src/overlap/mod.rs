@@ -42,6 +42,7 @@ mod shell;
 mod sighting;
 mod start;
 mod strip;
+pub mod windows;
 
 pub use angular::AngularBook;
 pub use averages::{Averages, FaceStress, Node};
@@ -231,7 +232,7 @@ impl<L: ShearLaw + Copy> Overlap<L> {
                 ..Held::default()
             },
             given: Given::nothing(nodes),
-            monitors: Monitors::default(),
+            monitors: Monitors::new(&strip, &settings),
             ledger: Ledger::default(),
             steps: of_loads * loads,
             steps_of_loads: of_loads,
@@ -330,7 +331,7 @@ impl<L: ShearLaw + Copy> Overlap<L> {
 
     /// Starts the monitors anew.
     pub fn watch(&mut self) {
-        self.monitors = Monitors::default();
+        self.monitors.clear();
     }
 
     /// What the monitors say.

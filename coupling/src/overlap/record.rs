@@ -1,7 +1,7 @@
 //! Checkpoints of an overlap: named arrays, bit-exact.
 
 use super::shell::{Given, PULL};
-use super::{FaceStress, Ledger, Monitors, Overlap, OverlapError, Work};
+use super::{FaceStress, Ledger, Overlap, OverlapError, Work};
 use colluvium_continuum::rheology::ShearLaw;
 use colluvium_continuum::yield_step::FlowState;
 use colluvium_dem::Record;
@@ -132,7 +132,7 @@ impl<L: ShearLaw + Copy> Overlap<L> {
             ));
         }
         self.shell.take_up(pulls);
-        self.monitors = Monitors::from_numbers(record.numbers("monitors")?)?;
+        self.monitors.take_up(finite("monitors")?)?;
         self.ledger = Ledger::from_numbers(record.numbers("ledger")?)?;
         match record.counts("made")? {
             &[made] if made < self.steps => self.made = made,

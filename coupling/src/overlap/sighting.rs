@@ -15,6 +15,11 @@ pub(super) fn free_grains(simulation: &Simulation) -> Vec<GrainSample> {
     grains
 }
 
+/// How many they are: what budgets are of. Those that are fixed, a floor or a wall, make no motion of their own and do not count.
+pub(super) fn free_count(simulation: &Simulation) -> usize {
+    simulation.held(|_| true).filter(|g| !g.fixed).count()
+}
+
 /// Their mass (kg).
 pub(super) fn free_mass(simulation: &Simulation) -> f64 {
     free_grains(simulation).iter().map(|grain| grain.mass).sum()

@@ -499,6 +499,31 @@ fn a_box_that_has_grown_goes_on_from_its_numbers_and_within_its_budget() {
     assert_eq!(kept.bowl.refused_moves(), 2.0);
 }
 
+/// A budget is of grains that move: with those on the floor of the middle held in place, a side goes out within a budget that all
+/// grains together exceed, and not within one that those which move exceed.
+#[test]
+fn a_budget_of_a_box_is_of_free_grains() {
+    let with = |budget: f64| {
+        let mut bed = Bed::with(Travel { budget, ..TRAVEL });
+        let middle = |g: &GrainSample| (g.position.x - 0.5 * SIZE[0]).abs() < 2.0;
+        let floor = |g: &GrainSample| g.position.z < 1.0 && middle(g);
+        bed.simulation.fix(floor).unwrap();
+        let made = bed
+            .bowl
+            .move_side(RIGHT, true, &mut bed.simulation)
+            .unwrap();
+        let free = bed.simulation.held(|_| true).filter(|g| !g.fixed).count() as f64;
+        (made, free, bed.simulation.grain_count() as f64)
+    };
+    let (made, free, all) = with(f64::INFINITY);
+    let held = all - free;
+    println!("{free} free grains and {held} that are held");
+    assert!(made && held >= 20.0);
+    // What has no room is left out when grains come back: a few.
+    assert!(with(free + 0.5 * held).0);
+    assert!(!with(free - 0.5 * held).0);
+}
+
 /// Grains are thrown up in the middle of a bed at rest: both sides, where nothing moves, come nearer; then those beside a
 /// side are thrown, and it goes out again.
 #[test]

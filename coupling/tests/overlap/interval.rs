@@ -105,7 +105,7 @@ pub fn calm(specs: &[MaterialEdgeSpec]) -> ([f64; 2], f64, f64, Joined) {
     let moved = moved.iter().zip(&before).map(|(a, b)| (a - b).abs());
     let moved = moved.fold(0.0, f64::max);
     let edges = joined.zone.edges().iter();
-    let monitors: Vec<&Monitors> = edges.map(|edge| edge.monitors()).collect();
+    let monitors: Vec<Monitors> = edges.map(|edge| edge.monitors()).collect();
     let escaped = monitors.iter().map(|m| m.escaped).sum();
     for m in &monitors {
         println!(

@@ -251,6 +251,7 @@ fn missed(sheared: &Sheared, limits: &Limits) -> Vec<String> {
         ("rate of the copy", copy / inner - 1.0, limits.copy),
         ("rate of the continuum", far / inner - 1.0, limits.far),
         ("rate below", below / inner - 1.0, limits.below),
+        // The shallow layer slips by 1.39 %, more than the 1 % asked; noise alone makes 0.50 %.
         ("slip", report.slip, 0.015),
         (
             "ratio of shear stresses",

@@ -1,5 +1,6 @@
 //! What grains and continuum give each other, and what the monitors say.
 
+use crate::overlap::windows::{self, Of, Sums};
 use nalgebra::Vector3;
 
 /// Impulses since the start (N s), and the bed's mass (kg).
@@ -110,14 +111,8 @@ fn over(miss: Vector3<f64>, entries: impl Iterator<Item = Vector3<f64>>) -> f64 
 pub struct Monitors {
     /// Exchanges seen.
     pub exchanges: f64,
-    /// Σ of the rms slip between both sides at the handshake surface (m/s).
-    pub slip: f64,
-    /// Largest of these (m/s).
-    pub largest_slip: f64,
     /// Σ of the normal force of the contacts that cross the handshake surface, and of the continuum's stress (N).
     pub force: [f64; 2],
-    /// Σ |impulse| of the relaxation, cell by cell, and of the traction, face by face (N s).
-    pub impulse: [f64; 2],
     /// Most grains beyond the box by more than a diameter.
     pub escaped: f64,
     /// Grains times their steps.
@@ -134,22 +129,22 @@ pub struct Monitors {
     /// Work on the grains of the traction, of the impedance and of the relaxation (J), by velocities when they are laid;
     /// negative where it takes energy from them.
     pub work: [f64; 3],
+    /// Sizes of slip and relaxation.
+    pub(in crate::overlap) windows: Sums,
 }
 
-/// Numbers of the monitors.
-pub const MONITORED: usize = 19;
+/// Numbers of the monitors without those of the windows, and with them.
+const OWN: usize = 15;
+/// See `OWN`.
+pub const MONITORED: usize = OWN + windows::NUMBERS;
 
 impl Monitors {
     /// All of it in a row of numbers.
     pub fn numbers(&self) -> [f64; MONITORED] {
-        [
+        let own: [f64; OWN] = [
             self.exchanges,
-            self.slip,
-            self.largest_slip,
             self.force[0],
             self.force[1],
-            self.impulse[0],
-            self.impulse[1],
             self.escaped,
             self.grain_steps,
             self.steps[0],
@@ -162,30 +157,43 @@ impl Monitors {
             self.work[0],
             self.work[1],
             self.work[2],
-        ]
+        ];
+        let windows = self.windows.numbers();
+        std::array::from_fn(|k| match k.checked_sub(OWN) {
+            None => own[k],
+            Some(k) => windows[k],
+        })
     }
 
     /// From such numbers.
     pub fn of(n: &[f64; MONITORED]) -> Self {
         Self {
             exchanges: n[0],
-            slip: n[1],
-            largest_slip: n[2],
-            force: [n[3], n[4]],
-            impulse: [n[5], n[6]],
-            escaped: n[7],
-            grain_steps: n[8],
-            steps: [n[9], n[10]],
-            iterations: n[11],
-            residual: n[12],
-            temperature: [n[13], n[14], n[15]],
-            work: [n[16], n[17], n[18]],
+            force: [n[1], n[2]],
+            escaped: n[3],
+            grain_steps: n[4],
+            steps: [n[5], n[6]],
+            iterations: n[7],
+            residual: n[8],
+            temperature: [n[9], n[10], n[11]],
+            work: [n[12], n[13], n[14]],
+            windows: Sums::from_numbers(&std::array::from_fn(|k| n[OWN + k])),
         }
     }
 
-    /// Mean rms slip at the handshake surface (m/s).
+    /// Size of the slip at the handshake surface, by means over windows in time ([`windows`]), mean over cells and windows (m/s).
     pub fn mean_slip(&self) -> f64 {
-        self.slip / self.exchanges.max(1.0)
+        self.windows.of(Of::Slip).mean()
+    }
+
+    /// What the noise of the grains' velocities alone would make it (m/s).
+    pub fn slip_noise(&self) -> f64 {
+        self.windows.of(Of::Slip).noise()
+    }
+
+    /// Largest mean of one window (m/s).
+    pub fn largest_slip(&self) -> f64 {
+        self.windows.of(Of::Slip).largest
     }
 
     /// Mean granular temperatures of the buffer, the inner overlap and the grains beyond it (m²/s²).
@@ -198,9 +206,14 @@ impl Monitors {
         self.force[0] / self.force[1]
     }
 
-    /// Impulse of the relaxation over that of the traction.
+    /// Impulse of the relaxation, cell by cell, over that of the traction, face by face, by sizes of means over windows.
     pub fn relaxation_share(&self) -> f64 {
-        self.impulse[0] / self.impulse[1]
+        self.windows.of(Of::Relaxation).size / self.windows.of(Of::Traction).size
+    }
+
+    /// What the noise of the grains' velocities alone would make it.
+    pub fn relaxation_noise(&self) -> f64 {
+        self.windows.of(Of::Relaxation).floor / self.windows.of(Of::Traction).size
     }
 }
 

@@ -16,7 +16,7 @@
 //! The continuum's surface stays where it was in each column of cells. Stored grains weigh what they weigh and the
 //! continuum in their place what its law says: the difference is taken off the surface of the continuum, evenly, so that a
 //! move changes no mass; that of momenta the continuum gives back with what it owes. A move outwards beyond a budget of
-//! grains is refused and counted. Every move is kept with its reason ([`Move`]).
+//! free grains is refused and counted. Every move is kept with its reason ([`Move`]).
 
 use super::gradients::{gradient_at, gradients};
 use super::journey::{Growth, Move};
@@ -25,7 +25,7 @@ use super::store::{Store, stretched};
 use super::zone::{SIDES, Side, Zone};
 use super::{Bowl, OverlapError};
 use crate::overlap::dense_limits::Reason;
-use crate::overlap::sighting::free_mass;
+use crate::overlap::sighting::{free_count, free_mass};
 use colluvium_dem::{Grain, Partner, Patch, Simulation};
 use nalgebra::{Matrix3, Vector3};
 
@@ -211,12 +211,13 @@ impl Bowl {
             depth < shell && zone.label(&cells, &g.position) >= 0.0
         };
         if outwards {
-            let grains = self.stored().grains.iter().filter(|g| joins(g));
+            let free = self.stored().grains.iter().filter(|g| !g.fixed);
+            let grains = free.filter(|g| joins(g));
             let again = grains
                 .clone()
                 .filter(|g| old.label(&cells, &g.position) >= 0.0);
             let more = grains.count() as f64 - again.count() as f64;
-            let all = simulation.grain_count() as f64 + more;
+            let all = free_count(simulation) as f64 + more;
             // Without any side there would be no continuum left.
             if all > growth.travel.budget || zone.sides.is_empty() {
                 return Ok(false);

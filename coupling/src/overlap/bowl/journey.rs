@@ -10,7 +10,7 @@ use colluvium_dem::Patch;
 /// When a box grows and shrinks (SI).
 #[derive(Clone, Copy, Debug, PartialEq)]
 pub struct Growth {
-    /// Thresholds, the time at rest, limits of dense flow, and the budget; a strip is as wide as the buffer, whatever its width says.
+    /// Thresholds, the time at rest, limits of dense flow, and the budget (of free grains, the ball among them); a strip is as wide as the buffer, whatever its width says.
     pub travel: Travel,
     /// Distance between the ball and the inner end of the overlap below which a side moves outwards (m).
     pub near: f64,

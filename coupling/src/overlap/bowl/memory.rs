@@ -65,6 +65,7 @@ impl Bowl {
         };
         put(&[self.exchanges as f64, self.layout.height]);
         put(&self.monitors.numbers());
+        put(&self.windows.numbers());
         put(&self.columns);
         put(&self.moved);
         put(&[self.view.rest.ratio]);
@@ -143,6 +144,7 @@ struct Rows<'a> {
     exchanges: f64,
     height: f64,
     monitors: [f64; account::MONITORED],
+    window: &'a [f64],
     columns: &'a [f64],
     moved: &'a [f64],
     ratio: f64,
@@ -182,6 +184,7 @@ impl<'a> Rows<'a> {
             exchanges,
             height,
             monitors: take()?.try_into().ok()?,
+            window: take()?,
             columns: take()?,
             moved: take()?,
             ratio: *take()?.first()?,
@@ -247,6 +250,8 @@ impl<'a> Rows<'a> {
         bowl.held.area = self.area.to_vec();
         bowl.owed = vectors(self.owed);
         bowl.monitors = Monitors::of(&self.monitors);
+        let unfit = || OverlapError::Record("the bowl's window of monitors does not fit".into());
+        bowl.windows.take_up(self.window).ok_or_else(unfit)?;
         bowl.monitors.grain_steps = scalars[3];
         bowl.monitors.work = [scalars[16], scalars[17], scalars[18]];
         bowl.laid.powers = [scalars[19], scalars[20], scalars[21]];

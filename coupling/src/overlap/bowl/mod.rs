@@ -47,6 +47,7 @@ use super::joint;
 use super::rest_stress::RestStress;
 use super::settings::{Resolved, check};
 use super::sighting::{Sighting, free_mass};
+use super::windows::Windows;
 use cells::Sums;
 use colluvium_continuum::free_surface::{Outside, SpaceFields, SpaceFlow, SurfaceOptions};
 use colluvium_continuum::rheology::MuI;
@@ -300,6 +301,8 @@ pub struct Bowl {
     gradients: Vec<Matrix3<f64>>,
     account: Account,
     monitors: Monitors,
+    /// The window of slip and relaxation that is open.
+    windows: Windows,
     /// Steps for which loads are held, how often until an exchange, and how often since the last one.
     steps_of_loads: u64,
     loads_of_exchange: u64,
@@ -403,6 +406,7 @@ impl Bowl {
             gradients: vec![Matrix3::zeros(); count],
             account: Account::default(),
             monitors: Monitors::default(),
+            windows: Windows::new(3, [count; 2], &spec.settings),
             steps_of_loads,
             loads_of_exchange,
             made: 0,
@@ -540,9 +544,12 @@ impl Bowl {
         owed.sum::<Vector3<f64>>() - self.unborne
     }
 
-    /// What the monitors have seen.
-    pub fn monitors(&self) -> &Monitors {
-        &self.monitors
+    /// What the monitors have seen, with the window that is open.
+    pub fn monitors(&self) -> Monitors {
+        Monitors {
+            windows: self.windows.closed(&self.monitors.windows),
+            ..self.monitors
+        }
     }
 
     /// Farthest that grains have moved through a face of the box in the mean, outwards positive (m).

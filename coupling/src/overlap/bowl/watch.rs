@@ -2,6 +2,7 @@
 
 use super::Bowl;
 use super::zone::Side;
+use crate::overlap::windows::Of;
 use colluvium_dem::GrainSample;
 use nalgebra::Vector3;
 
@@ -11,12 +12,51 @@ const FILLED: f64 = 0.5;
 const ESCAPED: f64 = 1.0;
 
 impl Bowl {
-    /// Sums |impulses| of what the grains were given.
+    /// Takes in the impulses of what the grains were given.
     pub(super) fn watch_impulses(&mut self) {
-        let relaxation: f64 = self.given.relaxation.iter().map(|f| f.norm()).sum();
-        let traction: f64 = self.held.traction.iter().map(|f| f.norm()).sum();
-        self.monitors.impulse[0] += relaxation;
-        self.monitors.impulse[1] += traction * self.exchange_time();
+        let dt = self.exchange_time();
+        let variances = self.variances();
+        for (cell, (impulse, [buffer, _])) in
+            self.given.relaxation.iter().zip(&variances).enumerate()
+        {
+            // Cells that relax nothing have no noise of it, either.
+            if *impulse != Vector3::zeros() {
+                self.windows.relax(cell, (*impulse).into(), *buffer, dt);
+            }
+        }
+        for (face, traction) in self.faces.all.iter().zip(&self.held.traction) {
+            let impulse = (traction * dt).into();
+            self.windows
+                .add(Of::Traction, face.cells[0], impulse, [dt, 0.0]);
+        }
+    }
+
+    /// Variance in a direction of the momenta of the grains that a cell is compared with, if they move independently: of the buffer, and of
+    /// the whole overlap (N² s²).
+    fn variances(&self) -> Vec<[f64; 2]> {
+        let [handshake, inner] = self.layout.widths;
+        let (cells, zone) = (&self.layout.cells, &self.layout.zone);
+        let belongs = self.spec.belongs();
+        let mut sums = vec![[0.0; 2]; cells.count()];
+        for grain in self.sighting.snapshot.grains.iter().filter(|g| belongs(g)) {
+            let label = zone.label(cells, &grain.position);
+            if label >= inner {
+                continue;
+            }
+            let hats = cells.hats(&grain.position);
+            if self.view.velocity_at(&hats).is_none() {
+                continue;
+            }
+            let square = grain.mass.powi(2) * self.fluctuation(grain).norm_squared() / 3.0;
+            for (cell, hat) in hats {
+                let variance = hat * hat * square;
+                sums[cell][1] += variance;
+                if label < handshake {
+                    sums[cell][0] += variance;
+                }
+            }
+        }
+        sums
     }
 
     /// Normal force (N) of the contacts that cross the handshake surface, from the nearest side of the grain outside. Averages over
@@ -66,7 +106,8 @@ impl Bowl {
     /// Looks at both sides of the handshake surface, after a time (s).
     pub(super) fn watch(&mut self, dt: f64) {
         let (cells, zone) = (&self.layout.cells, &self.layout.zone);
-        let (mut slips, mut weights) = (0.0, 0.0);
+        // How many faces of the surface a cell has.
+        let mut beside = vec![0.0; cells.count()];
         let mut force = [self.through_handshake(), 0.0];
         for face in &self.handshake.all {
             let axis = zone.sides[face.side].axis;
@@ -76,20 +117,18 @@ impl Bowl {
             let area = fraction * cells.face_area(axis);
             force[1] -= area * stress[(axis, axis)];
             for cell in face.cells {
-                let cover = &self.sums.cover[cell];
-                let mass = cover.buffer + cover.inner;
-                if mass > 0.0 {
-                    let slip = (cover.buffer_slip + cover.inner_slip) / mass;
-                    weights += mass;
-                    slips += mass * slip.norm_squared();
-                }
+                beside[cell] += 1.0;
             }
         }
-        let slip = if weights > 0.0 {
-            f64::sqrt(slips / weights)
-        } else {
-            0.0
-        };
+        let variances = self.variances();
+        for (cell, &faces) in beside.iter().enumerate().filter(|(_, n)| **n > 0.0) {
+            let cover = &self.sums.cover[cell];
+            let slip = (cover.buffer_slip + cover.inner_slip) * faces * dt;
+            let mass = (cover.buffer + cover.inner) * faces;
+            let weights = [mass, variances[cell][1] * faces * faces];
+            self.windows
+                .add(Of::Slip, cell, slip.into(), weights.map(|w| w * dt));
+        }
         let beyond = -ESCAPED * self.spec.law.diameter / self.spec.settings.cell;
         let belongs = self.spec.belongs();
         let escaped = self.sighting.snapshot.grains.iter();
@@ -107,12 +146,11 @@ impl Bowl {
         }
         let temperatures = self.temperatures();
         let m = &mut self.monitors;
+        self.windows.pass(dt, &mut m.windows);
         for (sum, temperature) in m.temperature.iter_mut().zip(temperatures) {
             *sum += temperature;
         }
         m.exchanges += 1.0;
-        m.slip += slip;
-        m.largest_slip = m.largest_slip.max(slip);
         for (sum, force) in m.force.iter_mut().zip(force) {
             *sum += force;
         }

@@ -1,6 +1,7 @@
 //! What grains and continuum give each other, and what the monitors say.
 
 use super::side::Side;
+use crate::overlap::windows::{self, Of, Sums};
 
 /// Momentum along x and z since the start (N s), and masses (kg).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -152,16 +153,10 @@ fn quotient(misses: [f64; 2], largest: f64) -> f64 {
 pub struct Monitors {
     /// Exchanges seen.
     pub exchanges: f64,
-    /// Σ of the rms slip between both sides at the handshake surface (m/s).
-    pub slip: f64,
-    /// Largest of these (m/s).
-    pub largest_slip: f64,
     /// Σ of the force along x through the handshake surface, of what crosses it as grains and of the continuum's stress (N).
     pub force: [f64; 2],
     /// Σ of the grains' mass in the full cells of the overlap, over that of the continuum in them.
     pub packing: f64,
-    /// Σ |impulse| of the relaxation, cell by cell, and of the traction, row by row (N s).
-    pub impulse: [f64; 2],
     /// Most grains beyond the edge by more than a diameter along its normal.
     pub escaped: f64,
     /// Steps of the continuum, and active cells in them.
@@ -178,23 +173,23 @@ pub struct Monitors {
     /// Work on the grains of the traction, of the impedance, and of the relaxation with what carries those that lie in the
     /// continuum (J), by velocities when they are laid; negative where it takes energy from them.
     pub work: [f64; 3],
+    /// Sizes of slip and relaxation.
+    pub(in crate::overlap) windows: Sums,
 }
 
-/// Numbers of the monitors.
-pub const MONITORED: usize = 21;
+/// Numbers of the monitors without those of the windows, and with them.
+const OWN: usize = 17;
+/// See `OWN`.
+pub const MONITORED: usize = OWN + windows::NUMBERS;
 
 impl Monitors {
     /// All of it in a row of numbers.
     pub fn numbers(&self) -> [f64; MONITORED] {
-        [
+        let own: [f64; OWN] = [
             self.exchanges,
-            self.slip,
-            self.largest_slip,
             self.force[0],
             self.force[1],
             self.packing,
-            self.impulse[0],
-            self.impulse[1],
             self.escaped,
             self.steps[0],
             self.steps[1],
@@ -208,31 +203,44 @@ impl Monitors {
             self.work[0],
             self.work[1],
             self.work[2],
-        ]
+        ];
+        let windows = self.windows.numbers();
+        std::array::from_fn(|k| match k.checked_sub(OWN) {
+            None => own[k],
+            Some(k) => windows[k],
+        })
     }
 
     /// From such numbers.
     pub fn of(n: &[f64; MONITORED]) -> Self {
         Self {
             exchanges: n[0],
-            slip: n[1],
-            largest_slip: n[2],
-            force: [n[3], n[4]],
-            packing: n[5],
-            impulse: [n[6], n[7]],
-            escaped: n[8],
-            steps: [n[9], n[10]],
-            residual: n[11],
-            newton: [n[12], n[13]],
-            renewed: n[14],
-            temperature: [n[15], n[16], n[17]],
-            work: [n[18], n[19], n[20]],
+            force: [n[1], n[2]],
+            packing: n[3],
+            escaped: n[4],
+            steps: [n[5], n[6]],
+            residual: n[7],
+            newton: [n[8], n[9]],
+            renewed: n[10],
+            temperature: [n[11], n[12], n[13]],
+            work: [n[14], n[15], n[16]],
+            windows: Sums::from_numbers(&std::array::from_fn(|k| n[OWN + k])),
         }
     }
 
-    /// Mean rms slip at the handshake surface (m/s).
+    /// Size of the slip at the handshake surface, by means over windows in time ([`windows`]), mean over cells and windows (m/s).
     pub fn mean_slip(&self) -> f64 {
-        self.slip / self.exchanges.max(1.0)
+        self.windows.of(Of::Slip).mean()
+    }
+
+    /// What the noise of the grains' velocities alone would make it (m/s).
+    pub fn slip_noise(&self) -> f64 {
+        self.windows.of(Of::Slip).noise()
+    }
+
+    /// Largest mean of one window (m/s).
+    pub fn largest_slip(&self) -> f64 {
+        self.windows.of(Of::Slip).largest
     }
 
     /// Mean forces along x of grains and continuum through the handshake surface (N).
@@ -255,9 +263,14 @@ impl Monitors {
         self.packing / self.exchanges.max(1.0)
     }
 
-    /// Impulse of the relaxation over that of the traction.
+    /// Impulse of the relaxation, cell by cell, over that of the traction, row by row, by sizes of means over windows.
     pub fn relaxation_share(&self) -> f64 {
-        self.impulse[0] / self.impulse[1]
+        self.windows.of(Of::Relaxation).size / self.windows.of(Of::Traction).size
+    }
+
+    /// What the noise of the grains' velocities alone would make it.
+    pub fn relaxation_noise(&self) -> f64 {
+        self.windows.of(Of::Relaxation).floor / self.windows.of(Of::Traction).size
     }
 }
 

@@ -59,6 +59,7 @@ impl MaterialEdge {
             self.held.reach,
         ]);
         put(&self.monitors.numbers());
+        put(&self.windows.numbers());
         put(&self.labels.given);
         put(&self.labels.base);
         let journey = &self.journey;
@@ -118,7 +119,7 @@ impl MaterialEdge {
         else {
             return Ok(None);
         };
-        let Some(labels) = take() else {
+        let Some((window, labels)) = take().zip(take()) else {
             return Ok(None);
         };
         let keeps = known.is_none();
@@ -212,6 +213,9 @@ impl MaterialEdge {
         edge.held.handshake = handshake.to_vec();
         edge.held.reach = reach;
         edge.owed = owed.as_chunks::<2>().0.to_vec();
+        if edge.windows.take_up(window).is_none() {
+            return Ok(None);
+        }
         edge.monitors = Monitors::of(monitors);
         edge.monitors.work = [scalars[11], scalars[12], scalars[13]];
         edge.exchanges = exchanges as u64;

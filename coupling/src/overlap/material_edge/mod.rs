@@ -60,6 +60,7 @@ use super::joint;
 use super::rest_stress::RestStress;
 use super::settings::Resolved;
 use super::sighting::{Sighting, free_grains};
+use super::windows::Windows;
 use cells::Sums;
 use colluvium_continuum::column_collapse::CollapseCase;
 use colluvium_continuum::free_surface::{Outside, SurfaceOptions};
@@ -207,6 +208,8 @@ pub struct MaterialEdge {
     owed: Vec<[f64; 2]>,
     account: Account,
     monitors: Monitors,
+    /// The window of slip and relaxation that is open.
+    windows: Windows,
     /// Steps for which loads are held, how often until an exchange, and how often since the last one.
     steps_of_loads: u64,
     loads_of_exchange: u64,
@@ -302,6 +305,7 @@ impl MaterialEdge {
             owed: vec![[0.0; 2]; cells.count()],
             account: Account::default(),
             monitors: Monitors::default(),
+            windows: Windows::new(2, [cells.count(), cells.counts[1]], &spec.settings),
             steps_of_loads: spec.settings.steps_of_loads(timestep),
             loads_of_exchange: spec.settings.loads_of_exchange(timestep),
             made: 0,
@@ -383,9 +387,12 @@ impl MaterialEdge {
         })
     }
 
-    /// What the monitors have seen.
-    pub fn monitors(&self) -> &Monitors {
-        &self.monitors
+    /// What the monitors have seen, with the window that is open.
+    pub fn monitors(&self) -> Monitors {
+        Monitors {
+            windows: self.windows.closed(&self.monitors.windows),
+            ..self.monitors
+        }
     }
 
     /// Time between two exchanges (s).

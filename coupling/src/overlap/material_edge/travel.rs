@@ -18,6 +18,7 @@
 
 use super::{Continuum, MaterialEdge, OverlapError};
 use crate::overlap::dense_limits::{DenseLimits, Reason};
+use crate::overlap::sighting::free_count;
 use colluvium_dem::{Grain, GrainSample, Patch, Simulation};
 use nalgebra::Vector3;
 
@@ -32,7 +33,7 @@ pub struct Travel {
     pub wake: f64,
     /// How long grains have to rest (s).
     pub hold: f64,
-    /// Most free grains; those that are fixed, the floor, cost no steps of their own and do not count.
+    /// Most free grains of all that are held, on either side of the overlap; those that are fixed do not count.
     pub budget: f64,
     /// Fewest free grains beyond the overlap.
     pub fewest: f64,
@@ -340,7 +341,7 @@ impl MaterialEdge {
         let more = strips.last().map_or(0, |patch| {
             patch.grains.iter().filter(|grain| !grain.fixed).count()
         });
-        let now = simulation.held(|_| true).filter(|g| !g.fixed).count();
+        let now = free_count(simulation);
         if (now + more) as f64 > travel.budget {
             let is_new = self.journey.refuse(BY_BUDGET);
             self.journey.refused += f64::from(u8::from(is_new));

@@ -5,6 +5,7 @@ use super::exchange::STEEPEST;
 use super::rows::slopes;
 use super::witness::Through;
 use crate::overlap::joint::over;
+use crate::overlap::windows::Of;
 use colluvium_dem::GrainSample;
 use nalgebra::Vector3;
 
@@ -12,13 +13,47 @@ use nalgebra::Vector3;
 const ESCAPED: f64 = 1.0;
 
 impl MaterialEdge {
-    /// Sums |impulses| of what the grains were given.
+    /// Takes in the impulses of what the grains were given.
     pub(super) fn watch_impulses(&mut self) {
-        let size = |[x, z]: [f64; 2]| f64::hypot(x, z);
-        let relaxation: f64 = self.given.relaxation.iter().copied().map(size).sum();
-        let traction: f64 = self.held.rows.iter().map(|row| size(row.traction)).sum();
-        self.monitors.impulse[0] += relaxation;
-        self.monitors.impulse[1] += traction * self.exchange_time();
+        let dt = self.exchange_time();
+        let variances = self.variances();
+        let given = self.given.relaxation.iter().zip(&variances);
+        for (cell, (&[x, z], [buffer, _])) in given.enumerate() {
+            // Cells that relax nothing have no noise of it, either.
+            if [x, z] != [0.0; 2] {
+                self.windows.relax(cell, [x, z, 0.0], *buffer, dt);
+            }
+        }
+        for (k, row) in self.held.rows.iter().enumerate() {
+            let [x, z] = row.traction.map(|force| force * dt);
+            self.windows.add(Of::Traction, k, [x, z, 0.0], [dt, 0.0]);
+        }
+    }
+
+    /// Variance in a direction of the momenta of the grains that a cell is compared with, if they move independently: of the buffer, and of
+    /// the whole overlap (N² s²).
+    fn variances(&self) -> Vec<[f64; 2]> {
+        let [handshake, inner] = self.spec.zones();
+        let mut sums = vec![[0.0; 2]; self.cells.count()];
+        for grain in &self.sighting.snapshot.grains {
+            let Some(label) = self.labels.of(grain).filter(|label| *label < inner) else {
+                continue;
+            };
+            let hats = self.cells.hats(grain.position.x, grain.position.z);
+            if self.view.velocity_at(&hats).is_none() {
+                continue;
+            }
+            let apart = self.fluctuation(grain);
+            let square = 0.5 * grain.mass.powi(2) * (apart.x * apart.x + apart.z * apart.z);
+            for (cell, hat) in hats {
+                let variance = hat * hat * square;
+                sums[cell][1] += variance;
+                if label < handshake {
+                    sums[cell][0] += variance;
+                }
+            }
+        }
+        sums
     }
 
     /// What goes through the handshake surface as grains. Averages over cells would be too low by what the
@@ -78,7 +113,8 @@ impl MaterialEdge {
     /// Looks at both sides of the handshake surface.
     pub(super) fn watch(&mut self) {
         let columns = self.cells.counts[0];
-        let (mut slips, mut weights) = (0.0, 0.0);
+        let dt = self.exchange_time();
+        let variances = self.variances();
         let (mut pressed, mut leaning) = (0.0, 0.0);
         let slopes = slopes(&self.held.handshake, &self.cells);
         for (k, &place) in self.held.handshake.iter().enumerate() {
@@ -93,18 +129,17 @@ impl MaterialEdge {
                 let cell = i + columns * k;
                 let cover = &self.sums.cover[cell];
                 let mass = cover.buffer + cover.inner;
-                if mass > 0.0 {
-                    let slip = [0, 1].map(|a| (cover.buffer_slip[a] + cover.inner_slip[a]) / mass);
-                    weights += mass * hat;
-                    slips += mass * hat * (slip[0] * slip[0] + slip[1] * slip[1]);
-                }
+                let [x, z] =
+                    [0, 1].map(|a| (cover.buffer_slip[a] + cover.inner_slip[a]) * hat * dt);
+                let weights = [mass * hat, variances[cell][1] * hat * hat];
+                self.windows
+                    .add(Of::Slip, cell, [x, z, 0.0], weights.map(|w| w * dt));
             }
             pressed -= fraction * xx;
             leaning += fraction * xz * slopes[k].clamp(-STEEPEST, STEEPEST);
         }
         let area = self.cells.spacing * self.spec.slab;
         let through = self.through_handshake();
-        let slip = over(slips, weights).sqrt();
         let full = self.full();
         let (mut packed, mut cells) = (0.0, 0.0);
         for (cell, cover) in self.sums.cover.iter().enumerate() {
@@ -118,9 +153,8 @@ impl MaterialEdge {
         let escaped = self.escaped() as f64;
         let temperatures = self.temperatures();
         let m = &mut self.monitors;
+        self.windows.pass(dt, &mut m.windows);
         m.exchanges += 1.0;
-        m.slip += slip;
-        m.largest_slip = m.largest_slip.max(slip);
         m.force[0] += through.sum();
         m.force[1] += (pressed + leaning) * area;
         m.packing += over(packed, cells);

@@ -367,13 +367,19 @@ impl JoinedColumn<'_> {
                 "slip",
                 slip,
                 0.0,
-                "rms difference of mean velocities at the handshake surface over √(g height), mean in time; to be below 1 %",
+                "difference of mean velocities at the handshake surface over √(g height), by sizes of means over windows of time; to be below 1 %",
+            ),
+            (
+                "slip_noise",
+                monitors.slip_noise() / unit,
+                0.0,
+                "what the noise of the grains' velocities alone would make the slip",
             ),
             (
                 "largest_slip",
-                monitors.largest_slip / unit,
+                monitors.largest_slip() / unit,
                 0.0,
-                "the same, at its largest",
+                "the slip of the worst window",
             ),
             (
                 "force_ratio",
@@ -391,7 +397,13 @@ impl JoinedColumn<'_> {
                 "relaxation_share",
                 share,
                 0.0,
-                "impulse of the relaxation over that of the traction; to be below 10 %",
+                "impulse of the relaxation over that of the traction, by sizes of means over windows of time; to be below 10 %",
+            ),
+            (
+                "relaxation_noise",
+                monitors.relaxation_noise(),
+                0.0,
+                "what the noise of the grains' velocities alone would make the relaxation_share",
             ),
             (
                 "grains_escaped",

@@ -127,7 +127,14 @@ fn monitors(summary: &mut Summary, scene: &InclineScene, result: &JoinedInclineR
         report.slip,
         "1",
         0.0,
-        "velocity of the continuum over the grains' at the handshake surface, less 1; to be below 1 %",
+        "velocity of the continuum less the grains' at the handshake surface, over theirs, by sizes of means over windows of time; to be below 1 %",
+    );
+    against(
+        "slip_noise",
+        report.slip_noise,
+        "1",
+        0.0,
+        "what the noise of the grains' velocities alone would make the slip",
     );
     let ratio = "grains over continuum at the handshake surface; to be within 5 %";
     let none = "none: the continuum has no such stress at the handshake surface, but for round-off";
@@ -144,7 +151,14 @@ fn monitors(summary: &mut Summary, scene: &InclineScene, result: &JoinedInclineR
         report.relaxation_share,
         "1",
         0.0,
-        "impulse of relaxation over that of the shear traction; to be below 10 %",
+        "impulse of relaxation, layer by layer, over that of the shear traction, by sizes of means over windows of time; to be below 10 %",
+    );
+    against(
+        "relaxation_noise",
+        report.relaxation_noise,
+        "1",
+        0.0,
+        "what the noise of the grains' velocities alone would make the relaxation_share",
     );
     against(
         "grains_escaped",

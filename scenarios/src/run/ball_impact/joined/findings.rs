@@ -92,13 +92,19 @@ impl JoinedBed<'_> {
                 "slip",
                 slip,
                 0.0,
-                "rms difference of mean velocities at the handshake surface over the ball's speed, mean in time; to be below 1 %",
+                "difference of mean velocities at the handshake surface over the ball's speed, by sizes of means over windows of time; to be below 1 %",
+            ),
+            (
+                "slip_noise",
+                monitors.slip_noise() / self.scene.speed,
+                0.0,
+                "what the noise of the grains' velocities alone would make the slip",
             ),
             (
                 "largest_slip",
-                monitors.largest_slip / self.scene.speed,
+                monitors.largest_slip() / self.scene.speed,
                 0.0,
-                "the same, at its largest",
+                "the slip of the worst window",
             ),
             (
                 "force_ratio",
@@ -116,7 +122,13 @@ impl JoinedBed<'_> {
                 "relaxation_share",
                 monitors.relaxation_share(),
                 0.0,
-                "impulse of the relaxation over that of the traction",
+                "impulse of the relaxation over that of the traction, by sizes of means over windows of time",
+            ),
+            (
+                "relaxation_noise",
+                monitors.relaxation_noise(),
+                0.0,
+                "what the noise of the grains' velocities alone would make the relaxation_share",
             ),
             (
                 "grains_escaped",
