@@ -229,6 +229,14 @@ impl<const D: usize, const C: usize, const V: usize> Discretisation<D, C, V> {
         &self.points
     }
 
+    /// Points whose threshold pressure comes from more cells than there is room for.
+    pub(crate) fn crowded_points(&self) -> usize {
+        self.points
+            .iter()
+            .filter(|point| point.is_crowded())
+            .count()
+    }
+
     /// The quadrature points, to be changed.
     pub(crate) fn points_mut(&mut self) -> &mut [QuadraturePoint<C, V>] {
         &mut self.points
@@ -385,5 +393,24 @@ mod tests {
             force[j] += area * pressure[cell];
         }
         assert!(force.iter().all(|f| f.abs() < 1e-13));
+    }
+
+    /// A seventh pressure has no room at a point of a plane: the first stands for it, and that is counted.
+    #[test]
+    fn pressures_without_room_are_counted() {
+        let grid = Grid::new([bounded(1.0, 3, WALL, WALL), bounded(1.0, 3, WALL, LOADED)]).unwrap();
+        let mut discretisation = Discretisation::new(grid, ThresholdPressure::Corner);
+        assert_eq!(discretisation.crowded_points(), 0);
+        let mut point = QuadraturePoint::new(1.0);
+        for cell in 0..VELOCITIES {
+            point.add_pressure(cell, 0.1);
+            point.add_pressure(cell, 0.0);
+        }
+        assert!(!point.is_crowded());
+        point.add_pressure(VELOCITIES, 0.4);
+        discretisation.points_mut()[4] = point;
+        assert_eq!(discretisation.crowded_points(), 1);
+        let (cells, weights) = discretisation.points()[4].pressures();
+        assert_eq!((cells.len(), cells[0], weights[0]), (VELOCITIES, 0, 0.5));
     }
 }

@@ -298,6 +298,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         let mut growing_from = planned;
         for _ in 0..=MAX_CUTS {
             self.transport(dt);
+            record.unsettled_cells = self.transport.unsettled();
             // The velocity moves on to the middle of the next step, from wherever it is: the last one
             // may have become shorter than it was planned.
             let next = self.allowed_step(growing_from);

@@ -84,6 +84,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             None => material.operators(),
             Some(ground) => material.operators_over(ground),
         };
+        record.crowded_points = discretisation.crowded_points();
         self.gather(&faces, &places);
         if self.falls_freely(&discretisation, dt) {
             self.spent.operators += clock.elapsed().as_secs_f64();
