@@ -153,7 +153,12 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
     /// Whether the friction of matter at rest holds free upright faces.
     fn stands(&self) -> bool {
         let [one, two] = [1.0, 2.0].map(|p| self.rheology.threshold(0.0, p).stress);
-        two - one >= standing::friction(standing::free_axes(&self.grid)).max(1.0)
+        if two - one < 1.0 {
+            return false;
+        }
+        let (fractions, ground) = (&self.state.fractions, self.bed.as_ref());
+        let free = standing::free_axes(&self.grid, &self.topology, fractions, ground);
+        two - one >= standing::friction(free)
     }
 
     /// Without pressure and stress, and if gravity alone lets no cell shrink, free fall is the exact
