@@ -196,15 +196,19 @@ impl<const D: usize, const C: usize, const V: usize> Discretisation<D, C, V> {
     }
 
     /// What decides where the matrix has coefficients.
-    pub(crate) fn pattern(&self) -> Vec<usize> {
-        let mut pattern = vec![self.velocities(), self.cells];
+    pub(crate) fn pattern(&self) -> Vec<u32> {
+        // Room for all at once: it is made in every step.
+        let most = 2 + 2 * self.divergence.len() + (2 + 2 * V) * self.points.len();
+        let mut pattern = Vec::with_capacity(most);
+        pattern.extend([self.velocities(), self.cells].map(|count| count as u32));
         for &(cell, velocity, _) in &self.divergence {
-            pattern.extend([cell, velocity]);
+            pattern.extend([cell as u32, velocity as u32]);
         }
         for point in &self.points {
-            pattern.extend([point.velocities().len(), point.pressures().0.len()]);
-            pattern.extend(point.velocities());
-            pattern.extend(point.pressures().0);
+            let (velocities, pressures) = (point.velocities(), point.pressures().0);
+            pattern.extend([velocities.len() as u32, pressures.len() as u32]);
+            pattern.extend(velocities.iter().map(|&j| j as u32));
+            pattern.extend(pressures.iter().map(|&cell| cell as u32));
         }
         pattern
     }

@@ -79,7 +79,7 @@ pub struct SurfaceFlow<
     ends: Option<OpenEnds>,
     /// Matter and ground together.
     filled: Vec<f64>,
-    solver: Option<(Vec<usize>, PrimalDual<C>)>,
+    solver: Option<(Vec<u32>, PrimalDual<C>)>,
     unknowns: FlowState<C>,
     momentum: Vec<f64>,
     divergence: Vec<f64>,
