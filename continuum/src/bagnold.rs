@@ -138,7 +138,8 @@ impl<L: ShearLaw> BagnoldCase<L> {
         Units::of_gravity(self.depth, self.rheology.bulk_density(), self.gravity)
     }
 
-    /// Computes the flow from rest to its steady state.
+    /// Computes the flow from rest to its steady state, or to the end time that the options set
+    /// ([`LayerSolution::is_steady`]).
     ///
     /// # Errors
     /// Parameters out of range, no convergence, no steady state, or a stop asked for by

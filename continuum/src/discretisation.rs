@@ -196,15 +196,19 @@ impl<const D: usize, const C: usize, const V: usize> Discretisation<D, C, V> {
     }
 
     /// What decides where the matrix has coefficients.
-    pub(crate) fn pattern(&self) -> Vec<usize> {
-        let mut pattern = vec![self.velocities(), self.cells];
+    pub(crate) fn pattern(&self) -> Vec<u32> {
+        // Room for all at once: it is made in every step.
+        let most = 2 + 2 * self.divergence.len() + (2 + 2 * V) * self.points.len();
+        let mut pattern = Vec::with_capacity(most);
+        pattern.extend([self.velocities(), self.cells].map(|count| count as u32));
         for &(cell, velocity, _) in &self.divergence {
-            pattern.extend([cell, velocity]);
+            pattern.extend([cell as u32, velocity as u32]);
         }
         for point in &self.points {
-            pattern.extend([point.velocities().len(), point.pressures().0.len()]);
-            pattern.extend(point.velocities());
-            pattern.extend(point.pressures().0);
+            let (velocities, pressures) = (point.velocities(), point.pressures().0);
+            pattern.extend([velocities.len() as u32, pressures.len() as u32]);
+            pattern.extend(velocities.iter().map(|&j| j as u32));
+            pattern.extend(pressures.iter().map(|&cell| cell as u32));
         }
         pattern
     }
@@ -227,6 +231,14 @@ impl<const D: usize, const C: usize, const V: usize> Discretisation<D, C, V> {
     /// The quadrature points.
     pub(crate) fn points(&self) -> &[QuadraturePoint<C, V>] {
         &self.points
+    }
+
+    /// Points whose threshold pressure comes from more cells than there is room for.
+    pub(crate) fn crowded_points(&self) -> usize {
+        self.points
+            .iter()
+            .filter(|point| point.is_crowded())
+            .count()
     }
 
     /// The quadrature points, to be changed.
@@ -385,5 +397,24 @@ mod tests {
             force[j] += area * pressure[cell];
         }
         assert!(force.iter().all(|f| f.abs() < 1e-13));
+    }
+
+    /// A seventh pressure has no room at a point of a plane: the first stands for it, and that is counted.
+    #[test]
+    fn pressures_without_room_are_counted() {
+        let grid = Grid::new([bounded(1.0, 3, WALL, WALL), bounded(1.0, 3, WALL, LOADED)]).unwrap();
+        let mut discretisation = Discretisation::new(grid, ThresholdPressure::Corner);
+        assert_eq!(discretisation.crowded_points(), 0);
+        let mut point = QuadraturePoint::new(1.0);
+        for cell in 0..VELOCITIES {
+            point.add_pressure(cell, 0.1);
+            point.add_pressure(cell, 0.0);
+        }
+        assert!(!point.is_crowded());
+        point.add_pressure(VELOCITIES, 0.4);
+        discretisation.points_mut()[4] = point;
+        assert_eq!(discretisation.crowded_points(), 1);
+        let (cells, weights) = discretisation.points()[4].pressures();
+        assert_eq!((cells.len(), cells[0], weights[0]), (VELOCITIES, 0, 0.5));
     }
 }

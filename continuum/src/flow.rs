@@ -49,7 +49,7 @@ pub struct Marching {
     pub steady_acceleration: f64,
     /// … nor by more than this fraction of the largest velocity in one step.
     pub steady_change: f64,
-    /// Time at which to stop although the flow is not steady.
+    /// Time at which to stop whether the flow is steady or not.
     pub end_time: Option<f64>,
 }
 
@@ -197,6 +197,7 @@ impl<R: Rheology> Flow<R> {
     pub fn between_side_walls(
         grid: Grid,
         walls: SideWalls,
+        threshold_pressure: ThresholdPressure,
         rheology: R,
         acceleration: [f64; DIMENSIONS],
         method: YieldMethod,
@@ -204,7 +205,7 @@ impl<R: Rheology> Flow<R> {
     ) -> Result<Self, Error> {
         walls.validate()?;
         let pressure = rows_of(&grid, pressure);
-        let mut discretisation = Discretisation::new(grid, ThresholdPressure::Corner);
+        let mut discretisation = Discretisation::new(grid, threshold_pressure);
         discretisation.add_side_walls(walls);
         Self::on(discretisation, rheology, acceleration, method, pressure)
     }
@@ -354,10 +355,11 @@ impl<R: Rheology> Flow<R> {
         Ok(())
     }
 
-    fn is_steady(&self, record: &StepRecord, marching: &Marching) -> bool {
+    /// Whether a flow is steady that comes out of this step.
+    pub(crate) fn is_steady(&self, record: &StepRecord, marching: &Marching) -> bool {
         let speed = self.max_speed().max(REST_VELOCITY);
         record.acceleration <= marching.steady_acceleration
-            && self.largest_change() <= marching.steady_change * speed
+            && record.acceleration * record.dt <= marching.steady_change * speed
     }
 
     fn largest_change(&self) -> f64 {

@@ -22,7 +22,7 @@ pub struct Options {
     pub marching: Marching,
     /// The method of a time step.
     pub method: YieldMethod,
-    /// Where the pressure of the threshold is taken.
+    /// Where the pressure of the material's threshold is taken; side walls rub on cells and take that of the cell.
     pub threshold_pressure: ThresholdPressure,
 }
 
@@ -72,6 +72,9 @@ pub struct LayerSolution {
     pub ill_posed_fraction: f64,
     /// Largest difference of velocity between the columns of a periodic grid (m/s).
     pub spread_along_x: f64,
+    /// Whether the flow has become steady: a march that [`Marching::end_time`] ends may leave it on its way, and the exact
+    /// velocity is that of the steady flow.
+    pub is_steady: bool,
     /// Number of steps.
     pub steps: usize,
     /// Linear systems solved.
@@ -169,6 +172,7 @@ impl<L: Rheology> Layer<'_, L> {
             Some(walls) => Flow::between_side_walls(
                 grid,
                 walls.in_units(&units),
+                options.threshold_pressure,
                 law,
                 acceleration,
                 options.method,
@@ -195,9 +199,15 @@ pub struct LayerRun<L> {
 }
 
 impl<L: Rheology> LayerRun<L> {
-    /// Whether the flow is steady.
+    /// Whether the march has come to its end: the flow is steady, or [`Marching::end_time`] is reached.
     pub fn is_over(&self) -> bool {
         self.march.over
+    }
+
+    /// Whether the flow is steady.
+    pub fn is_steady(&self) -> bool {
+        let last = self.march.history.last();
+        last.is_some_and(|record| self.flow.is_steady(record, &self.marching))
     }
 
     /// Makes one step.
@@ -208,7 +218,7 @@ impl<L: Rheology> LayerRun<L> {
         self.flow.march_step(&self.marching, &mut self.march)
     }
 
-    /// Marches until the flow is steady; `progress` sees every step and may break off.
+    /// Marches until the flow is steady or its end time is reached; `progress` sees every step and may break off.
     pub(crate) fn march(
         &mut self,
         progress: &mut dyn FnMut(Progress) -> ControlFlow<()>,
@@ -281,6 +291,7 @@ impl<L: Rheology> LayerRun<L> {
             yielded_fraction,
             ill_posed_fraction,
             spread_along_x: spread_along_x(flow) * units.velocity,
+            is_steady: self.is_steady(),
             steps: history.len(),
             linear_solves: history.iter().map(|r| r.linear_solves).sum(),
             cells: flow.discretisation().grid().cells(),

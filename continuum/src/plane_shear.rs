@@ -78,7 +78,8 @@ impl<L: ShearLaw> PlaneShearCase<L> {
         self.rheology.threshold(rate, self.load).stress * self.wall_velocity.signum()
     }
 
-    /// Computes the flow from rest to its steady state.
+    /// Computes the flow from rest to its steady state, or to the end time that the options set
+    /// ([`LayerSolution::is_steady`]).
     ///
     /// # Errors
     /// Parameters out of range, no convergence, no steady state, or a stop asked for by

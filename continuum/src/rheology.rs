@@ -56,7 +56,7 @@ pub trait Rheology: Sync {
         self.is_well_posed_in_space(rate, pressure, 0.0)
     }
 
-    /// The same in a flow with the middle eigenvalue λ₂ of 2D/γ̇.
+    /// The same in a flow with the middle eigenvalue λ₂ of 2D/γ̇, 0 in plane flow: C alone does not decide in others.
     fn is_well_posed_in_space(&self, rate: f64, pressure: f64, middle: f64) -> bool {
         pressure > 0.0 && self.threshold(rate, pressure).is_well_posed(rate, middle)
     }

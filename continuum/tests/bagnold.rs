@@ -151,6 +151,8 @@ fn momentum_grows_by_weight_less_friction() {
     let impulse = 0.2 * (0.43_f64.sin() - solution.boundary_shear_stress[0]);
     let mean = solution.history[0].mean_velocity;
     assert!((mean / impulse - 1.0).abs() < 1e-10);
+    // Stopped on its way, which is not to be taken for its end.
+    assert!(!solution.is_steady && solve(&reference(48)).is_steady);
 }
 
 #[test]

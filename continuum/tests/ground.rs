@@ -553,3 +553,22 @@ fn ground_that_does_not_fit_is_refused_by_name() {
         "{deep}"
     );
 }
+
+/// What finds no room in a box that is full is kept, and the record of the step counts where it lies.
+#[test]
+fn cells_that_find_no_room_are_counted() {
+    let (ground, lid) = (
+        line(&[[-1.0, 0.1], [4.0, 0.1]]),
+        line(&[[-1.0, 1.0], [4.0, 1.0]]),
+    );
+    for (excess, counted) in [(0.0, false), (0.2, true)] {
+        let mut flow = filled(12, &ground, &lid, grains(), Contact::NoSlip);
+        let mut state = flow.state().clone();
+        state.fractions[30] += excess;
+        flow.set_state(state).unwrap();
+        let before = flow.volume();
+        let step = flow.step(0.01).unwrap();
+        assert_eq!(step.unsettled_cells > 0, counted, "{step:?}");
+        assert!((flow.volume() - before).abs() < 1e-13);
+    }
+}

@@ -423,3 +423,47 @@ fn restart_gives_the_same_bits() {
     assert_eq!(whole.flow().state(), resumed.flow().state());
     assert!(resumed.set_state(Default::default()).is_err());
 }
+
+/// A straight upright face stands in space as it does in a plane, from μ = 1 on, whichever axis it lies across, and falls
+/// below; a corner of the same friction falls, too.
+#[test]
+fn straight_faces_stand_in_space_and_corners_fall() {
+    let cells = [12, 12, 8];
+    let moved = |mu: f64, reach: [usize; 2]| {
+        let axes = [0, 1, 2].map(|axis| {
+            let low = if axis == 2 { ROUGH } else { SMOOTH };
+            bounded(cells[axis] as f64 / 8.0, cells[axis], low, SMOOTH)
+        });
+        let filled = |n: usize| {
+            let [i, j, k] = [n % 12, n / 12 % 12, n / 144];
+            f64::from(u8::from(i < reach[0] && j < reach[1] && k < 6))
+        };
+        let fractions: Vec<f64> = (0..12 * 12 * 8).map(filled).collect();
+        let mut flow = SpaceFlow::in_space(
+            Grid::with_moving_surface(axes).unwrap(),
+            fractions.clone(),
+            MuI::new(mu, mu + 0.28, 0.4, 1.0 / 65.0, 1.0, 1.0),
+            [0.0, 0.0, -1.0],
+            SurfaceOptions::default(),
+        )
+        .unwrap();
+        while flow.state().time < 1.0 {
+            flow.step(1.0 - flow.state().time).unwrap();
+        }
+        let now = flow.state().fractions.iter().zip(&fractions);
+        now.map(|(a, b)| (a - b).abs()).sum::<f64>() / fractions.iter().sum::<f64>()
+    };
+    for (mu, reach, stands) in [
+        (1.2, [6, 12], true),
+        (1.2, [12, 6], true),
+        (0.9, [6, 12], false),
+        (1.2, [6, 6], false),
+    ] {
+        let part = moved(mu, reach);
+        println!("μ_s = {mu}, {reach:?} cells: {part:.1e} of the volume is elsewhere");
+        assert!(
+            if stands { part < 1e-4 } else { part > 0.05 },
+            "{mu} {reach:?} {part}"
+        );
+    }
+}

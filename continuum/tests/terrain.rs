@@ -179,6 +179,43 @@ fn raster_of_a_plane_is_that_plane() {
     }
 }
 
+/// A raster ends at its edges along both axes: beyond them there is no ground to be taken for the last heights.
+#[test]
+fn rasters_end_at_their_edges() {
+    let raster = HeightRaster {
+        origin: [0.0, 1.0],
+        spacing: [0.5, 0.5],
+        points: [3, 3],
+        heights: (0..9).map(f64::from).collect(),
+    };
+    let row = |y: f64| raster.profile(y).map(|line| line.points()[0][1]);
+    // The edges themselves, and what round-off makes of them, lie on it.
+    assert_eq!(row(1.0), Ok(0.0));
+    assert_eq!(row(2.0 + 1e-12), Ok(6.0));
+    for y in [0.9, 2.1, f64::NAN] {
+        let message = row(y).unwrap_err().to_string();
+        assert!(
+            message.contains("`terrain.y`") && message.contains("1 to 2 m"),
+            "{message}"
+        );
+    }
+    let beyond = |x: f64| {
+        let line = raster.profile(1.5).unwrap();
+        line.cut(&plane_grid([4, 10], [x, 10.0])).map(|_| ())
+    };
+    assert_eq!(beyond(1.0), Ok(()));
+    assert!(beyond(1.1).is_err());
+    let surface = raster.surface().unwrap();
+    for (low, size, spans) in [(1.0, 1.0, true), (0.9, 1.0, false), (1.0, 1.1, false)] {
+        let lines = GridLines {
+            origin: [0.0, low, 0.0],
+            cells: [4, 4, 10],
+            spacing: [0.25, size / 4.0, 1.0],
+        };
+        assert_eq!(surface.cut(&lines, false).is_ok(), spans, "{low} {size}");
+    }
+}
+
 /// Space cut by terrain that does not vary along y is the plane cut, cell by cell.
 #[test]
 fn plane_and_space_agree() {

@@ -206,6 +206,24 @@ fn heap_flows_on_material_at_rest_at_second_order() {
     }
 }
 
+/// Negative control: with the pressure of the material's threshold in cells a heap between side walls misses what the test
+/// above asks for, as a layer without them does.
+#[test]
+fn pressure_in_cells_spoils_the_heap() {
+    let options = Options {
+        threshold_pressure: ThresholdPressure::Cell,
+        ..Options::default()
+    };
+    for cells in [32, 128] {
+        let case = heap(cells);
+        let coarse = case.solve(&options, &mut |_| ControlFlow::Continue(()));
+        let coarse = coarse.unwrap().velocity_error_l2_relative;
+        let fine = solve(&case).velocity_error_l2_relative;
+        println!("{cells} cells: {fine:.2e} at corners, {coarse:.2e} in cells");
+        assert!(coarse > 3.0 * fine, "{cells} cells: {fine:e} {coarse:e}");
+    }
+}
+
 #[test]
 fn cohesive_heap_and_columns() {
     let mut case = heap(64);

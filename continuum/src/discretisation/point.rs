@@ -14,7 +14,9 @@ pub struct QuadraturePoint<const C: usize = COMPONENTS, const V: usize = VELOCIT
     /// Strain rate due to moving walls.
     pub(super) offset: [f64; C],
     pressures: [usize; V],
-    pressure_count: usize,
+    pressure_count: u32,
+    /// Pressures for which there was no room.
+    crowded_out: u32,
     pressure_weights: [f64; V],
     /// Part of the threshold pressure that is known beforehand.
     pub(crate) pressure_offset: f64,
@@ -34,6 +36,7 @@ impl<const C: usize, const V: usize> QuadraturePoint<C, V> {
             offset: [0.0; C],
             pressures: [0; V],
             pressure_count: 0,
+            crowded_out: 0,
             pressure_weights: [0.0; V],
             pressure_offset: 0.0,
             side: None,
@@ -103,16 +106,15 @@ impl<const C: usize, const V: usize> QuadraturePoint<C, V> {
     }
 
     pub(crate) fn add_pressure(&mut self, cell: usize, weight: f64) {
-        let known = &self.pressures[..self.pressure_count];
-        let slot = known
-            .iter()
-            .position(|&c| c == cell)
-            .unwrap_or(self.pressure_count);
-        if slot == self.pressure_count {
+        let count = self.pressure_count as usize;
+        let known = &self.pressures[..count];
+        let slot = known.iter().position(|&c| c == cell).unwrap_or(count);
+        if slot == count {
             if slot == V {
                 // No room for one more, which only a surface torn to shreds asks for: the nearest stands
                 // for it.
                 self.pressure_weights[0] += weight;
+                self.crowded_out += 1;
                 return;
             }
             self.pressures[slot] = cell;
@@ -136,9 +138,14 @@ impl<const C: usize, const V: usize> QuadraturePoint<C, V> {
     #[inline]
     pub(crate) fn pressures(&self) -> (&[usize], &[f64]) {
         (
-            &self.pressures[..self.pressure_count],
-            &self.pressure_weights[..self.pressure_count],
+            &self.pressures[..self.pressure_count as usize],
+            &self.pressure_weights[..self.pressure_count as usize],
         )
+    }
+
+    /// Whether cells had no room among these, so that the first of them stands for them.
+    pub(crate) fn is_crowded(&self) -> bool {
+        self.crowded_out > 0
     }
 
     /// Strain rate, walls included.

@@ -79,7 +79,7 @@ pub struct SurfaceFlow<
     ends: Option<OpenEnds>,
     /// Matter and ground together.
     filled: Vec<f64>,
-    solver: Option<(Vec<usize>, PrimalDual<C>)>,
+    solver: Option<(Vec<u32>, PrimalDual<C>)>,
     unknowns: FlowState<C>,
     momentum: Vec<f64>,
     divergence: Vec<f64>,
@@ -298,6 +298,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         let mut growing_from = planned;
         for _ in 0..=MAX_CUTS {
             self.transport(dt);
+            record.unsettled_cells = self.transport.unsettled();
             // The velocity moves on to the middle of the next step, from wherever it is: the last one
             // may have become shorter than it was planned.
             let next = self.allowed_step(growing_from);

@@ -101,7 +101,9 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         self.add_pressure_on_layers(&mass, &mut parts);
         parts.mass = mass;
         self.add_thin_layers(&mut parts);
-        let mut places = Vec::new();
+        let most = self.most_points();
+        parts.points.reserve(most);
+        let mut places = Vec::with_capacity(most);
         for (cell, &fraction) in self.fractions.iter().enumerate() {
             if fraction > EMPTY {
                 self.add_points(cell, &mut parts.points, &mut places);
@@ -114,6 +116,14 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             discretisation: Discretisation::of_parts(self.grid.clone(), parts),
             places,
         }
+    }
+
+    /// Points of all cells with material, those of walls left out: points are large, and to find room for more and more of
+    /// them means to move them.
+    pub(super) fn most_points(&self) -> usize {
+        let filled = self.fractions.iter().filter(|f| **f > EMPTY).count();
+        let sides = self.grid.axes().iter().filter(|axis| **axis != Axis::Flat);
+        filled << sides.count()
     }
 
     /// Where the unknowns are, in half cells.
@@ -473,7 +483,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
     /// μ < 1. With μ ≥ 1 the upright face of a column that stands bears p = s = ρ g z/2, the same on the face as behind
     /// it, so there the pressure goes on across faces along gravity as it is: through p = 0 the last cells behind the face
     /// would bear no more than half of it, and corners stand with μ ≥ 2 only. In space a corner needs more than μ = 1, and
-    /// so do all faces here ([`super::standing`]).
+    /// with it all faces of matter that has corners ([`super::standing`]).
     fn extrapolated(
         &self,
         cell: usize,

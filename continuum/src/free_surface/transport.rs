@@ -42,6 +42,8 @@ pub(crate) struct Transport<const D: usize = DIMENSIONS> {
     /// Matter and ground together.
     filled: Vec<f64>,
     settling: Settling,
+    /// Cells that the last settling left as they should not be.
+    unsettled: usize,
     /// Velocities that are carried, before the step.
     start: Velocity<D>,
     /// Momentum of each velocity of a component.
@@ -95,6 +97,7 @@ impl<const D: usize> Default for Transport<D> {
             next: Vec::new(),
             filled: Vec::new(),
             settling: Settling::default(),
+            unsettled: 0,
             start: components(),
             momentum: Vec::new(),
             before: (Vec::new(), components()),
@@ -208,13 +211,18 @@ impl<const D: usize> Transport<D> {
             std::mem::swap(fractions, &mut self.next);
         }
         if let Some(ground) = motion.ground {
-            ground.settle(motion.topology, fractions, &mut self.settling);
+            self.unsettled = ground.settle(motion.topology, fractions, &mut self.settling);
         }
     }
 
     /// Velocities that were carried, before the last step.
     pub(crate) fn carried(&self) -> &Velocity<D> {
         &self.start
+    }
+
+    /// Cells beside ground that hold more than they can or less than nothing after the last step.
+    pub(crate) fn unsettled(&self) -> usize {
+        self.unsettled
     }
 
     /// Volumes that flowed in and out in the last step, in cell volumes.

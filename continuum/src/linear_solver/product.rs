@@ -28,21 +28,28 @@ impl Product {
     pub(super) fn new(pattern: &SymbolicSparseColMat<usize>, definite: usize) -> Self {
         let (starts, all_rows) = (pattern.col_ptr(), pattern.row_idx());
         let mut begins = Vec::with_capacity(starts.len());
-        let (mut rows, mut slots) = (Vec::new(), Vec::new());
+        let mut rows = Vec::with_capacity(all_rows.len());
+        let mut slots = Vec::with_capacity(all_rows.len());
         for (column, bounds) in starts.windows(2).enumerate() {
-            let entries = || (bounds[0]..bounds[1]).map(|slot| (slot, all_rows[slot]));
-            let is_symmetric = |row: usize| row < definite && column < definite;
-            let mut begin = [rows.len() as u32; 2];
-            for (slot, row) in entries().filter(|(_, row)| is_symmetric(*row) && *row > column) {
-                rows.push(row as u32);
-                slots.push(slot as u32);
-            }
-            begin[1] = rows.len() as u32;
-            for (slot, row) in entries().filter(|(_, row)| !is_symmetric(*row) || *row == column) {
-                rows.push(row as u32);
-                slots.push(slot as u32);
-            }
-            begins.push(begin);
+            // In the order of their rows: what is left out, the diagonal, the symmetric ones below it, the others.
+            let here = &all_rows[bounds[0]..bounds[1]];
+            let parts = if column < definite {
+                let below = |row: usize| here.partition_point(|&r| r < row);
+                [column, column + 1, definite].map(below)
+            } else {
+                [0; 3]
+            };
+            let [diagonal, symmetric, others] = parts;
+            let mut take = |from: usize, to: usize| {
+                rows.extend(here[from..to].iter().map(|&row| row as u32));
+                slots.extend((bounds[0] + from..bounds[0] + to).map(|slot| slot as u32));
+                rows.len() as u32
+            };
+            let first = take(0, 0);
+            let second = take(symmetric, others);
+            take(diagonal, symmetric);
+            take(others, here.len());
+            begins.push([first, second]);
         }
         begins.push([rows.len() as u32; 2]);
         let size = begins.len() - 1;

@@ -12,9 +12,10 @@ use crate::units::Units;
 /// μ = (μ_s I_0 + μ_2 I + μ_∞ I²)/(I_0 + I)      from I_1 on,
 /// ```
 ///
-/// where I_1 is the inertial number below which the second form is ill posed (C = 0) and A makes μ
-/// continuous. With α < 2 the first form is well posed, and μ_∞ > 0 carries the second one to far
-/// larger inertial numbers than μ(I) bears. The price: μ → 0 as I → 0, so nothing is ever rigid and a
+/// where I_1 is the inertial number below which the second form is ill posed in plane flow (C = 0) and A makes μ
+/// continuous. With α < 2 the first form is well posed there, and μ_∞ > 0 carries the second one to far
+/// larger inertial numbers than μ(I) bears. In space flows whose middle stretching is negative are less well posed than
+/// plane ones at the same I, those with a positive one better. The price: μ → 0 as I → 0, so nothing is ever rigid and a
 /// slope of any angle creeps, at I = A exp(−α/tan²θ). Source: Barker & Gray, *J. Fluid Mech.* 828
 /// (2017) 5, eqs. 6.3 and 6.4, where α = 1.9 and μ_∞ = 0.05.
 #[derive(Debug, Clone, Copy, PartialEq)]

@@ -104,7 +104,8 @@ impl MuI {
         self.i_0 * (mu - self.mu_s) / (self.mu_2 - mu)
     }
 
-    /// C(I) of [`well_posedness`]: the equations are well posed where it is negative.
+    /// C(I) of [`well_posedness`]: the equations of plane flow are well posed where it is negative. In space the middle
+    /// eigenvalue of the stretching counts, too ([`Rheology::is_well_posed_in_space`]).
     pub fn well_posedness(&self, inertial_number: f64) -> f64 {
         let sum = self.i_0 + inertial_number;
         let slope = (self.mu_2 - self.mu_s) * self.i_0 / (sum * sum);

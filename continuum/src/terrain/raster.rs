@@ -3,6 +3,9 @@
 use super::Surface;
 use crate::error::{Error, require};
 
+/// A y that lies outside by less than this part of the distance of rows lies on the edge.
+const ROUND_OFF: f64 = 1e-9;
+
 /// Heights at the points of a regular raster, x running fastest, then y.
 #[derive(Debug, Clone, PartialEq)]
 pub struct HeightRaster {
@@ -88,15 +91,26 @@ impl HeightRaster {
         Surface::new(vertices, triangles)
     }
 
-    /// The profile along x at the row nearest to y (m), for a plane flow.
+    /// The profile along x at the row nearest to y (m), for a plane flow. The line ends with the raster, and a grid has to
+    /// lie within it.
     ///
     /// # Errors
-    /// As [`validate`](Self::validate).
+    /// As [`validate`](Self::validate), and for a y outside of the raster.
     pub fn profile(&self, y: f64) -> Result<super::Profile, Error> {
         self.validate()?;
         let [columns, rows] = self.points;
-        let nearest = ((y - self.origin[1]) / self.spacing[1]).round();
-        let row = nearest.clamp(0.0, (rows - 1) as f64) as usize;
+        let (first, last) = (self.origin[1], (rows - 1) as f64);
+        let place = (y - first) / self.spacing[1];
+        require(
+            (-ROUND_OFF..=last + ROUND_OFF).contains(&place),
+            "terrain.y",
+            y,
+            format!(
+                "{first} to {} m: where the raster has heights",
+                first + last * self.spacing[1]
+            ),
+        )?;
+        let row = place.round().clamp(0.0, last) as usize;
         let points = (0..columns).map(|column| {
             [
                 self.origin[0] + column as f64 * self.spacing[0],

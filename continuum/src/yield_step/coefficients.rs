@@ -18,9 +18,11 @@ pub(super) struct StepMatrix {
     divergence: Vec<[u32; 2]>,
     /// Slots of the diagonal of the cells.
     diagonal: Vec<u32>,
-    /// Slots of all points, one after the other: for each velocity of the point (row), its
+    /// Slots of all coefficients but the diagonal of the cells,
+    slots: Vec<u32>,
+    /// from here on those of all points, one after the other: for each velocity of the point (row), its
     /// velocities and then its pressures (columns).
-    points: Vec<u32>,
+    points_from: usize,
 }
 
 impl StepMatrix {
@@ -52,15 +54,17 @@ impl StepMatrix {
         (velocities..size).for_each(|i| blocks.push([i], [i]));
         let method = method_for(discretisation, tolerance, solver);
         let (system, slots) = SparseSystem::new(size, blocks, method, discretisation.places())?;
-        let (slots, diagonal) = slots.split_at(given);
-        let (mass, rest) = slots.split_at(velocities);
-        let (divergence, points) = rest.split_at(2 * discretisation.divergence().len());
+        let mut slots = slots;
+        let diagonal = slots.split_off(given);
+        let points_from = velocities + 2 * discretisation.divergence().len();
+        let (mass, divergence) = slots[..points_from].split_at(velocities);
         Ok(Self {
             system,
             mass: mass.to_vec(),
             divergence: divergence.chunks_exact(2).map(|c| [c[0], c[1]]).collect(),
-            points: points.to_vec(),
-            diagonal: diagonal.to_vec(),
+            points_from,
+            diagonal,
+            slots,
         })
     }
 
@@ -92,7 +96,7 @@ impl StepMatrix {
         for (&slot, _) in self.diagonal.iter().zip(released).filter(|(_, r)| **r) {
             values[slot as usize] -= volume;
         }
-        let mut slots = self.points.iter();
+        let mut slots = self.slots[self.points_from..].iter();
         for (q, point) in discretisation.points().iter().enumerate() {
             let (c, g) = law(q);
             let velocities = point.velocities().len();

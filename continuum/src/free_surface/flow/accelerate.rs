@@ -84,6 +84,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             None => material.operators(),
             Some(ground) => material.operators_over(ground),
         };
+        record.crowded_points = discretisation.crowded_points();
         self.gather(&faces, &places);
         if self.falls_freely(&discretisation, dt) {
             self.spent.operators += clock.elapsed().as_secs_f64();
@@ -152,7 +153,12 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
     /// Whether the friction of matter at rest holds free upright faces.
     fn stands(&self) -> bool {
         let [one, two] = [1.0, 2.0].map(|p| self.rheology.threshold(0.0, p).stress);
-        two - one >= standing::friction(standing::free_axes(&self.grid)).max(1.0)
+        if two - one < 1.0 {
+            return false;
+        }
+        let (fractions, ground) = (&self.state.fractions, self.bed.as_ref());
+        let free = standing::free_axes(&self.grid, &self.topology, fractions, ground);
+        two - one >= standing::friction(free)
     }
 
     /// Without pressure and stress, and if gravity alone lets no cell shrink, free fall is the exact

@@ -187,7 +187,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         flow.topology = topology;
         // What lies on ground reaches the lower edge of the grid nowhere: nothing is asked whether it hangs.
         flow.set_weight_for_pressure();
-        flow.stand_upright();
+        flow.stand_upright(Some(&ground));
         flow.saved.clone_from(&flow.state);
         flow.bed = Some(ground);
         Ok(flow)
@@ -203,7 +203,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
         let mut flow = Self::filling(grid, fractions, rheology, acceleration, options)?;
         flow.set_weight_for_pressure();
         flow.take_weight_from_what_hangs();
-        flow.stand_upright();
+        flow.stand_upright(None);
         flow.saved.clone_from(&flow.state);
         Ok(flow)
     }
@@ -297,13 +297,14 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
     /// Where friction lets columns bear their weight with nothing on their upright faces, they begin so ([`standing`]).
     /// Where walls or other
     /// matter lean on them the first step finds what holds there.
-    fn stand_upright(&mut self) {
-        let free = standing::free_axes(&self.grid);
-        if free == 0 {
+    fn stand_upright(&mut self, ground: Option<&Ground<D>>) {
+        let fractions = &self.state.fractions;
+        let free = standing::free_axes(&self.grid, &self.topology, fractions, ground);
+        if free == [false; D] {
             return;
         }
         let floor = self.options.solver.strain_rate_floor;
-        let (share, stress) = standing::stress::<D, C>(&self.grid);
+        let (share, stress) = standing::stress::<D, C>(free);
         let points = points_of(D);
         for (cell, weight) in self.state.pressure.iter_mut().enumerate() {
             let p = share * *weight;

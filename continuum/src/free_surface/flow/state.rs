@@ -109,6 +109,12 @@ pub struct SurfaceStep {
     pub cuts: usize,
     /// Points whose friction went by the pressure before the step ([`crate::yield_step::StepReport::held_points`]).
     pub held_points: usize,
+    /// Points whose threshold pressure comes from more cells than there is room for, so that the nearest one stands for
+    /// some: where a surface is torn to shreds.
+    pub crowded_points: usize,
+    /// Cells beside ground that hold more than they can or less than nothing after the transport, because what does not fit
+    /// found no room within the rounds that it is handed on.
+    pub unsettled_cells: usize,
     /// Residuals of the equations.
     pub residuals: Residuals,
     /// What they were allowed to be ([`crate::yield_step::StepReport::allowed`]).

@@ -33,7 +33,9 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             let g = self.acceleration[parts.components[j]];
             parts.boundary_load[j] = g * (total - parts.mass[j]);
         }
-        let mut places = Vec::new();
+        let most = self.most_points();
+        parts.points.reserve(most);
+        let mut places = Vec::with_capacity(most);
         self.add_layers(ground, &total, &mut parts, &mut places);
         self.add_pressures(ground, &total, &mut parts);
         self.add_pressure_on_layers(&total, &mut parts);

@@ -33,16 +33,26 @@ enum Exchange {
 }
 
 impl<const D: usize> Ground<D> {
-    /// Moves what does not fit into cells beside the ground to where there is room.
+    /// Moves what does not fit into cells beside the ground to where there is room. Returns the cells that hold more than
+    /// they can or less than nothing all the same: what they have is kept, and the next transport begins with it.
     pub(crate) fn settle(
         &self,
         topology: &Topology<D>,
         fractions: &mut [f64],
         work: &mut Settling,
-    ) {
+    ) -> usize {
         if D == 2 {
-            return self.settle_in_turn(topology, fractions);
+            self.settle_in_turn(topology, fractions);
+        } else {
+            self.settle_at_once(topology, fractions, work);
         }
+        let cells = fractions.iter().zip(&self.free);
+        cells
+            .filter(|(fraction, free)| **fraction < -EXCESS || *fraction - *free > EXCESS)
+            .count()
+    }
+
+    fn settle_at_once(&self, topology: &Topology<D>, fractions: &mut [f64], work: &mut Settling) {
         work.asked.clear();
         work.asked.resize(fractions.len(), 0.0);
         for _ in 0..LONGEST_WAY {
@@ -259,5 +269,56 @@ impl<const D: usize> Ground<D> {
             }
         }
         true
+    }
+}
+
+#[cfg(test)]
+mod tests {
+    use super::*;
+    use crate::free_surface::ground::{Contact, Terrain};
+    use crate::grid::{Axis, Boundary, Grid};
+    use crate::terrain::{Profile, Relief, Surface};
+
+    fn axes<const D: usize>() -> [Axis; D] {
+        let wall = Boundary::FreeSlip;
+        std::array::from_fn(|_| Axis::Bounded {
+            length: 3.0,
+            cells: 3,
+            low: wall,
+            high: wall,
+        })
+    }
+
+    /// Cells left as they should not be, where a box over level ground is full but for what its last cell lacks, and the
+    /// first one holds half a cell too much.
+    fn left<const D: usize>(ground: impl Relief<D>, lacks: f64) -> usize {
+        let grid = Grid::with_moving_surface(axes::<D>()).unwrap();
+        let topology = Topology::new(&grid);
+        let terrain = Terrain {
+            shape: ground,
+            origin: [0.0; D],
+            contact: Contact::NoSlip,
+            rise: [0; D],
+        };
+        let ground = Ground::new(&grid, &topology, &terrain).unwrap();
+        let mut fractions = ground.free.clone();
+        fractions[0] += 0.5;
+        *fractions.last_mut().unwrap() -= lacks;
+        let before: f64 = fractions.iter().sum();
+        let found = ground.settle(&topology, &mut fractions, &mut Settling::default());
+        let after: f64 = fractions.iter().sum();
+        assert!((after - before).abs() < 1e-13, "{before} {after}");
+        found
+    }
+
+    /// What finds room is handed on to it; what finds none stays, and is counted.
+    #[test]
+    fn what_finds_no_room_is_counted() {
+        let line = || Profile::new(vec![[-1.0, 0.2], [4.0, 0.2]]).unwrap();
+        let corners = [[-1.0, -1.0], [4.0, -1.0], [4.0, 4.0], [-1.0, 4.0]];
+        let corners = corners.map(|[x, y]| [x, y, 0.2]).to_vec();
+        let plane = || Surface::new(corners.clone(), vec![[0, 1, 2], [0, 2, 3]]).unwrap();
+        assert_eq!((left(line(), 0.6), left(plane(), 0.6)), (0, 0));
+        assert!(left(line(), 0.0) > 0 && left(plane(), 0.0) > 0);
     }
 }
