@@ -209,7 +209,7 @@ pub(super) fn describe_march(summary: &mut Summary, solution: &LayerSolution) {
     );
     if solution.ill_posed_fraction > 0.0 {
         summary.remarks.push(format!(
-            "Ill posed: in {:.0} % of the layer's volume μ(I) lies where short waves grow without bound in two or three dimensions (Barker et al. 2015).",
+            "Ill posed: in {:.0} % of the layer's volume μ(I) lies where short waves grow without bound in plane flow (Barker et al. 2015).",
             100.0 * solution.ill_posed_fraction
         ));
     }
