@@ -9,6 +9,7 @@ mod curve;
 mod file;
 mod page;
 
+pub use cell::campaign_scene;
 pub use file::MapFile;
 
 use crate::failure::Failure;

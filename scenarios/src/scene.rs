@@ -315,7 +315,7 @@ const LEAST_MASS: f64 = 1e-100;
 
 /// Checks a table of keys of the continuum scene as a scene file would be.
 pub fn check_continuum_keys(table: &toml::Table, origin: &str) -> Result<(), SceneError> {
-    check::check(table, &SceneBody::schema("bagnold"), origin)
+    check::check(table, &family::schema_of::<BagnoldScene>(), origin)
 }
 
 /// The JSON Schema of scene files, for editors.
@@ -351,58 +351,4 @@ pub fn json_schema() -> Value {
         "oneOf": kinds,
         "$defs": definitions,
     })
-}
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn every_bundled_scene_is_complete_and_survives_a_round_trip() {
-        for (name, _) in BUNDLED {
-            let scene = Scene::load(name, &[]).unwrap();
-            assert_eq!(scene.name, name);
-            let again = Scene::from_text(&scene.to_toml().unwrap(), "resolved").unwrap();
-            assert_eq!(scene, again);
-        }
-    }
-
-    #[test]
-    fn a_setting_reaches_its_key_and_drops_the_alternatives() {
-        let settings = [
-            "slope_degrees=31".to_owned(),
-            "contact.stiffness=5e4".to_owned(),
-        ];
-        let scene = Scene::load("incline-moderate", &settings).unwrap();
-        let SceneBody::Incline(incline) = scene.body else {
-            panic!("wrong kind")
-        };
-        assert_eq!(incline.slope_degrees, 31.0);
-        assert_eq!(incline.contact.stiffness, Some(5e4));
-        assert_eq!(incline.contact.stiffness_scaled, None);
-    }
-
-    #[test]
-    fn mistakes_name_key_value_and_range() {
-        let message = |set: &str| {
-            Scene::load("incline-moderate", &[set.to_owned()])
-                .unwrap_err()
-                .to_string()
-        };
-        let m = message("slope_degrees=95");
-        assert!(
-            m.contains("slope_degrees") && m.contains("95") && m.contains("90"),
-            "{m}"
-        );
-        let m = message("contact.fricton=0.3");
-        assert!(
-            m.contains("contact.fricton") && m.contains("contact.friction"),
-            "{m}"
-        );
-        let m = message("seed=\"one\"");
-        assert!(
-            m.contains("seed") && m.contains("one") && m.contains("integer"),
-            "{m}"
-        );
-    }
 }

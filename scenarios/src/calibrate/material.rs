@@ -29,20 +29,3 @@ fn is_bundled_material(scene: &Scene) -> bool {
         && scene.resolved.get("contact") == own.resolved.get("contact")
         && sizes(scene) == sizes(&own)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-
-    #[test]
-    fn another_contact_law_is_another_material() {
-        let of = |set: &str| {
-            published_material(&Scene::load("incline-moderate", &[set.to_owned()]).unwrap())
-        };
-        assert_eq!(of("grains.count=900"), Some("moderate"));
-        assert_eq!(of("slope_degrees=30"), Some("moderate"));
-        assert_eq!(of("contact.friction=0.5"), None);
-        assert_eq!(of("contact.stiffness_scaled=1e3"), None);
-        assert_eq!(of("grains.spread=0.2"), None);
-    }
-}

@@ -102,7 +102,10 @@ fn repose_scene(
 }
 
 /// The campaign of a cell whose first bed has this angle of repose (degrees).
-fn campaign_scene(scene: &Scene, beta: f64, mu_r: f64, repose: f64) -> Result<Scene, Failure> {
+///
+/// # Errors
+/// What the scene refuses.
+pub fn campaign_scene(scene: &Scene, beta: f64, mu_r: f64, repose: f64) -> Result<Scene, Failure> {
     let along = (beta / 0.1).log10();
     let slopes: Vec<String> = ABOVE
         .iter()
@@ -257,19 +260,7 @@ mod tests {
     use super::*;
 
     #[test]
-    fn a_cell_s_campaign_has_its_law_and_slopes_about_its_angle_of_repose() {
-        let scene = Scene::load("incline-moderate", &[]).unwrap();
-        let made = campaign_scene(&scene, 1.0, 2.0, 39.5).unwrap();
-        let SceneBody::Incline(body) = &made.body else {
-            panic!("{:?}", made.name)
-        };
-        let rolling = body.contact.rolling.as_ref().unwrap();
-        assert_eq!((rolling.beta, rolling.rolling_friction), (1.0, 2.0));
-        assert_eq!(
-            body.calibration.flow_degrees,
-            [38.5, 39.25, 40.0, 41.0, 42.25]
-        );
-        assert!(!body.calibration.search);
+    fn the_first_bed_is_looked_for_near_its_angle_and_beds_are_averaged() {
         assert_eq!(near(0.2, 1.05), 28.0);
         assert_eq!(near(0.1, 0.5), 24.0);
         let angle = mean_angle(&[30.5, 31.5]);

@@ -127,20 +127,6 @@ mod tests {
     use super::*;
 
     #[test]
-    fn too_many_runs_and_too_long_names_are_refused() {
-        let scene = Scene::load("bagnold", &[]).unwrap();
-        let many: Vec<String> = (1..=40).map(|n| n.to_string()).collect();
-        let varied = |key: &str| (key.to_owned(), many.clone());
-        let said = |varied: &[Varied]| format!("{:?}", variants(&scene, varied).unwrap_err());
-        let runs = said(&[varied("grid.cells"), varied("grid.columns")]);
-        assert!(runs.contains("1600 runs"), "{runs}");
-        let long = format!("1.{}", "0".repeat(300));
-        let values = vec![long, "2.0".to_owned()];
-        let name = said(&[("depth".to_owned(), values)]);
-        assert!(name.contains("at most 200"), "{name}");
-    }
-
-    #[test]
     fn keys_that_vary_are_read_and_refused() {
         let given = |all: &[&str]| parse(&all.iter().map(|v| (*v).to_owned()).collect::<Vec<_>>());
         let read = given(&["a.b=1, 2", "c=x,y,z"]).unwrap();

@@ -61,7 +61,6 @@ impl RheologyFile {
 mod tests {
     use super::*;
     use crate::rheology_file::FitRow;
-    use crate::scene::{Scene, SceneBody};
     use colluvium_continuum::bagnold::BagnoldCase;
     use colluvium_continuum::rheology::MuI;
     use std::path::Path;
@@ -126,31 +125,6 @@ mod tests {
             let points = read.table.unwrap();
             assert!((points[1][1] - 0.74 * ratio).abs() < 1e-12);
         }
-    }
-
-    #[test]
-    fn a_slope_reads_it_and_other_scenes_do_not() {
-        let file = RheologyFile::read(Path::new("moderate")).unwrap();
-        let root = {
-            let zz = file.mu_zz.clone().unwrap();
-            let i = file.valid_i.map(|[a, b]| (a * b).sqrt()).unwrap();
-            (mu_of_i(zz.mu_s, zz.mu_2, zz.i_0, i) / mu_of_i(file.mu_s, file.mu_2, file.i_0, i))
-                .sqrt()
-        };
-        // The campaign's own mean of the points is 0.928 ± 0.013.
-        assert!((root * root - 0.928).abs() < 0.013, "{root}");
-        let SceneBody::Incline(body) = Scene::load("incline", &[]).unwrap().body else {
-            panic!("no incline")
-        };
-        let keys = body.rheology.unwrap();
-        let zz = file.mu_zz.clone().unwrap();
-        assert_eq!(keys.mu_s, Some(zz.mu_s));
-        assert_eq!(keys.i_0, Some(zz.i_0 * root));
-        let set = ["rheology.file=moderate".to_owned()];
-        let SceneBody::Bagnold(body) = Scene::load("bagnold", &set).unwrap().body else {
-            panic!("no layer")
-        };
-        assert_eq!(body.rheology.i_0, Some(file.i_0));
     }
 
     #[test]

@@ -149,24 +149,3 @@ pub(super) fn run(scene: &SettleScene, under: &mut Under) -> Result<Findings, Fa
     let ran = bed::run(&bed, under)?;
     bed::findings(&bed, ran, left_out(scene), under)
 }
-
-#[cfg(test)]
-mod tests {
-    use super::*;
-    use crate::scene::SceneBody;
-    use colluvium_dem::Simulation;
-
-    #[test]
-    fn loose_grains_touch_neither_each_other_nor_the_walls() {
-        for set in ["seed=3", "coarse_graining=2", "scale=0.3"] {
-            let scene = Scene::load("settle", &[set.to_owned()]).unwrap();
-            let SceneBody::Settle(body) = &scene.body else {
-                panic!("wrong kind")
-            };
-            let bed = prepare(body, Threads::Serial).unwrap();
-            assert_eq!(bed.setup.grains.len(), body.count());
-            let mut simulation = Simulation::new(bed.setup).unwrap();
-            assert_eq!(simulation.energy().elastic(), 0.0, "{set}");
-        }
-    }
-}

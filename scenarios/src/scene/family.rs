@@ -91,12 +91,17 @@ trait OneScene: serde::Serialize + serde::de::DeserializeOwned + schemars::JsonS
     }
 
     fn schema(_name: &str) -> Value {
-        schemars::schema_for!(Self).to_value()
+        schema_of::<Self>()
     }
 
     fn to_table(&self) -> Result<toml::Table, toml::ser::Error> {
         toml::Table::try_from(self)
     }
+}
+
+/// The JSON Schema of these keys, without the key `scene`.
+pub(super) fn schema_of<K: schemars::JsonSchema>() -> Value {
+    schemars::schema_for!(K).to_value()
 }
 
 impl OneScene for InclineScene {}

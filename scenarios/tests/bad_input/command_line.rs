@@ -1,6 +1,7 @@
 //! The command line, scene files, where results go.
 
 use super::Case;
+use crate::command::colluvium;
 
 /// Arguments, and what the message has to contain.
 pub const CASES: &[Case] = &[
@@ -93,3 +94,24 @@ pub const CASES: &[Case] = &[
         &["beta", "1000000000", "allowed"],
     ),
 ];
+
+#[test]
+fn too_many_runs_and_too_long_names_are_refused() {
+    let folder = tempfile::tempdir().unwrap();
+    let said = |varied: &[String]| {
+        let mut arguments = vec!["pareto", "bagnold"];
+        for one in varied {
+            arguments.extend(["--vary", one]);
+        }
+        let done = colluvium(folder.path(), &arguments);
+        assert_eq!(done.status.code(), Some(2));
+        String::from_utf8_lossy(&done.stderr).into_owned()
+    };
+    let many: Vec<String> = (4..=43).map(|n| n.to_string()).collect();
+    let of = |key: &str| format!("{key}={}", many.join(","));
+    let runs = said(&[of("grid.cells"), of("grid.columns")]);
+    assert!(runs.contains("1600 runs"), "{runs}");
+    let name = said(&[format!("depth=1.{},2.0", "0".repeat(300))]);
+    assert!(name.contains("at most 200"), "{name}");
+    assert_eq!(std::fs::read_dir(folder.path()).unwrap().count(), 0);
+}
