@@ -148,6 +148,20 @@ fn pile_above_repose_flows() {
     assert!(step.max_speed > 1e-3, "{:e}", step.max_speed);
 }
 
+/// A step that does not go forwards is refused and changes nothing.
+#[test]
+fn steps_go_forwards() {
+    let mut wedge = pile(12, 0.05, |x| 0.5 - 0.4 * (x - 0.07));
+    let before = wedge.state().clone();
+    for limit in [0.0, -0.1, f64::NAN] {
+        for refused in [wedge.step(limit), wedge.accelerate_in_place(limit)] {
+            let message = refused.unwrap_err().to_string();
+            assert!(message.contains("allowed above 0"), "{message}");
+        }
+    }
+    assert_eq!(wedge.state(), &before);
+}
+
 /// A detached lump falls freely: its velocity is g t on all of its faces and it keeps its shape.
 #[test]
 fn detached_lump_falls_freely() {

@@ -206,6 +206,17 @@ fn rasters_end_at_their_edges() {
     assert_eq!(beyond(1.0), Ok(()));
     assert!(beyond(1.1).is_err());
     let surface = raster.surface().unwrap();
+    // The same line from its triangles, its edges included.
+    for y in [1.0, 1.5, 2.0] {
+        let [of_rows, of_triangles] = [raster.profile(y), surface.profile(y)].map(Result::unwrap);
+        assert_eq!(
+            of_rows.points().first(),
+            of_triangles.points().first(),
+            "{y}"
+        );
+        assert_eq!(of_rows.points().last(), of_triangles.points().last(), "{y}");
+    }
+    assert!(surface.profile(0.99).is_err() && surface.profile(2.01).is_err());
     for (low, size, spans) in [(1.0, 1.0, true), (0.9, 1.0, false), (1.0, 1.1, false)] {
         let lines = GridLines {
             origin: [0.0, low, 0.0],

@@ -196,7 +196,9 @@ fn interrupted_column_of_grains_goes_on_to_the_same_state() {
 fn interrupted_collapse_goes_on_to_the_same_state() {
     goes_on_to_the_same_state("run column-collapse", |out| {
         let mut list = vec!["run", "column-collapse", "--out", out];
-        list.extend(["--set", "scale=0.5", "--set", "aspect=0.7"]);
+        for set in ["scale=0.5", "aspect=0.7", "duration_scaled=3"] {
+            list.extend(["--set", set]);
+        }
         list
     });
 }
@@ -209,6 +211,7 @@ fn interrupted_collapse_on_terrain_goes_on_to_the_same_state() {
         for set in [
             "scale=0.5",
             "aspect=0.7",
+            "duration_scaled=3",
             "terrain={profile=[[0.0,1.0],[2.0,1.0],[2.2,0.3],[6.0,0.0]]}",
         ] {
             list.extend(["--set", set]);
@@ -221,7 +224,7 @@ fn interrupted_collapse_on_terrain_goes_on_to_the_same_state() {
 fn interrupted_cylinder_goes_on_to_the_same_state() {
     goes_on_to_the_same_state("run cylinder-collapse", |out| {
         let mut list = vec!["run", "cylinder-collapse", "--out", out];
-        list.extend(["--set", "scale=0.5", "--set", "duration_scaled=3"]);
+        list.extend(["--set", "scale=0.5", "--set", "duration_scaled=1.5"]);
         list
     });
 }
@@ -231,7 +234,7 @@ fn interrupted_cylinder_goes_on_to_the_same_state() {
 fn interrupted_open_chute_goes_on_to_the_same_state() {
     goes_on_to_the_same_state("run open-chute", |out| {
         let mut list = vec!["run", "open-chute", "--out", out];
-        list.extend(["--set", "scale=0.75"]);
+        list.extend(["--set", "scale=0.75", "--set", "duration_scaled=3"]);
         list
     });
 }
@@ -241,7 +244,7 @@ fn interrupted_open_chute_goes_on_to_the_same_state() {
 fn interrupted_silo_goes_on_to_the_same_state() {
     goes_on_to_the_same_state("run silo-discharge", |out| {
         let mut list = vec!["run", "silo-discharge", "--out", out];
-        list.extend(["--set", "duration_scaled=4"]);
+        list.extend(["--set", "duration_scaled=1.5"]);
         list
     });
 }
@@ -252,7 +255,7 @@ fn interrupted_open_chute_in_space_goes_on_to_the_same_state() {
     goes_on_to_the_same_state("run open-chute", |out| {
         let mut list = vec!["run", "open-chute", "--out", out];
         let across = "in_space={breadth=0.05,cells=6,walls={contact=\"free-slip\"}}";
-        for set in ["scale=0.5", "duration_scaled=1.5", across] {
+        for set in ["scale=0.5", "duration_scaled=0.5", across] {
             list.extend(["--set", set]);
         }
         list

@@ -15,8 +15,8 @@ fn run<'a>(out: &'a str, sets: &[&'a str]) -> Vec<&'a str> {
     list
 }
 
-/// Eight grains on the height: they and their continuum come to the same heap, which a law of another material does not;
-/// without friction they run away. Volume stays, and threads change nothing.
+/// Eight grains on the height: they and their continuum come to the same heap, which a law of another material does not.
+/// Volume stays, and threads change nothing.
 #[test]
 fn grains_and_their_continuum_leave_the_same_heap() {
     let folder = tempfile::tempdir().unwrap();
@@ -35,13 +35,7 @@ fn grains_and_their_continuum_leave_the_same_heap() {
         .concat(),
     );
     assert_eq!(hash(&at("one")), hash(&at("two")));
-    let slippery = [
-        "contact.friction=0",
-        "grains.calibrated=none",
-        "duration_scaled=5",
-    ];
-    succeed(folder.path(), &run("slippery", &slippery));
-    let [glass, gravel, slippery] = ["one", "two", "slippery"].map(|name| summary(&at(name)));
+    let [glass, gravel] = ["one", "two"].map(|name| summary(&at(name)));
     for name in [
         "runout_scaled",
         "continuum_runout_scaled",
@@ -53,7 +47,7 @@ fn grains_and_their_continuum_leave_the_same_heap() {
     ] {
         println!(
             "{name}: {:?}",
-            [&glass, &gravel, &slippery].map(|s| s["results"][name]["value"].as_f64())
+            [&glass, &gravel].map(|s| s["results"][name]["value"].as_f64())
         );
     }
     let [own, other] = [&glass, &gravel].map(|s| value(s, "deposit_difference"));
@@ -63,7 +57,6 @@ fn grains_and_their_continuum_leave_the_same_heap() {
         ["deposit_height", "continuum_deposit_height"].map(|name| value(&glass, name));
     assert!((continuum / top - 1.0).abs() < 0.15, "{continuum} {top}");
     assert!(value(&glass, "time_of_rest") > 0.3);
-    assert!(value(&slippery, "runout_scaled") > 1.7 * value(&glass, "runout_scaled"));
     // Heights times the areas of their rings are the grains' volume at their solid fraction, at all times.
     let volume = |rows: &[Vec<f64>], r: usize, h: usize| -> f64 {
         // Near the axis the smeared radius, as heights are taken over it.
@@ -84,6 +77,21 @@ fn grains_and_their_continuum_leave_the_same_heap() {
     assert!((before / whole - 1.0).abs() < 1e-9 && (after / whole - 1.0).abs() < 1e-9);
     let report = std::fs::read_to_string(at("one").join("report.html")).unwrap();
     assert!(report.contains("continuum with their calibrated law"));
+}
+
+/// Without friction they run away: beyond 1.9 radii, where those with it go 1.02.
+#[test]
+#[ignore = "half a minute; run by tests/validate.sh"]
+fn without_friction_grains_run_away() {
+    let folder = tempfile::tempdir().unwrap();
+    let slippery = [
+        "contact.friction=0",
+        "grains.calibrated=none",
+        "duration_scaled=5",
+    ];
+    succeed(folder.path(), &run("slippery", &slippery));
+    let found = summary(&folder.path().join("slippery"));
+    assert!(value(&found, "runout_scaled") > 1.8);
 }
 
 #[test]

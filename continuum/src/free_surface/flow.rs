@@ -265,8 +265,9 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
     /// stands still.
     ///
     /// # Errors
-    /// [`Error::NotConverged`].
+    /// [`Error::OutOfRange`] for a `dt` that is not above 0; [`Error::NotConverged`].
     pub fn accelerate_in_place(&mut self, dt: f64) -> Result<SurfaceStep, Error> {
+        require_forwards("dt", dt)?;
         let mut record = SurfaceStep::default();
         if self.accelerate(dt, &mut record)? {
             record.dt = dt;
@@ -280,9 +281,10 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
     /// Makes one step of at most `limit`. A step that does not converge is halved and tried again.
     ///
     /// # Errors
-    /// [`Error::NotConverged`] when halving does not help, and what the solver refuses; the state is then that of before
+    /// [`Error::OutOfRange`] for a `limit` that is not above 0, [`Error::NotConverged`] when halving does not help, and what the solver refuses; the state is then that of before
     /// the step, but that from rest the velocity may have its first half of a step.
     pub fn step(&mut self, limit: f64) -> Result<SurfaceStep, Error> {
+        require_forwards("limit", limit)?;
         let mut record = SurfaceStep::default();
         if self.state.next_step == 0.0 {
             self.first_half_step(&mut record)?;
@@ -457,6 +459,18 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
             }
         }
         heights
+    }
+}
+
+/// Refuses a time step that does not go forwards (natural units); one without a limit does.
+fn require_forwards(key: &'static str, value: f64) -> Result<(), Error> {
+    match value > 0.0 {
+        true => Ok(()),
+        false => Err(Error::OutOfRange {
+            key,
+            value,
+            allowed: "above 0".into(),
+        }),
     }
 }
 

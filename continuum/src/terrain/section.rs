@@ -13,9 +13,12 @@ impl Surface {
     /// # Errors
     /// [`Error::OutOfRange`] where the plane meets no triangle, or a loop, or several lines.
     pub fn profile(&self, y: f64) -> Result<Profile, Error> {
+        // Corners on the plane count as beyond it, but on the edge of the surface, where nothing lies before them.
+        let lowest = (self.vertices().iter()).fold(f64::INFINITY, |least, x| least.min(x[1]));
+        let is_before = |place: f64| place < y || (y == lowest && place == y);
         let mut pieces = Vec::new();
         for corners in self.triangles() {
-            pieces.extend(self.piece(corners, y));
+            pieces.extend(self.piece(corners, y, is_before));
         }
         require(
             !pieces.is_empty(),
@@ -64,12 +67,17 @@ impl Surface {
     }
 
     /// The piece in which the plane cuts a triangle, with the ground on its right hand.
-    fn piece(&self, corners: &[usize; 3], y: f64) -> Option<[[f64; 2]; 2]> {
+    fn piece(
+        &self,
+        corners: &[usize; 3],
+        y: f64,
+        is_before: impl Fn(f64) -> bool,
+    ) -> Option<[[f64; 2]; 2]> {
         let corner = |n: usize| self.vertices()[corners[n % 3]];
         let [mut up, mut down] = [None; 2];
         for n in 0..3 {
             let (from, to) = (corner(n), corner(n + 1));
-            if (from[1] < y) == (to[1] < y) {
+            if is_before(from[1]) == is_before(to[1]) {
                 continue;
             }
             // The same order of both ends in both triangles of an edge gives the same digits.
@@ -80,7 +88,7 @@ impl Surface {
             };
             let share = (y - a[1]) / (b[1] - a[1]);
             let point = Some([a[0] + share * (b[0] - a[0]), a[2] + share * (b[2] - a[2])]);
-            if from[1] < y {
+            if is_before(from[1]) {
                 up = point;
             } else {
                 down = point;
