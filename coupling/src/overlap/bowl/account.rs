@@ -1,5 +1,6 @@
 //! What grains and continuum give each other, and what the monitors say.
 
+use crate::overlap::joint::miss_over;
 use crate::overlap::windows::{self, Of, Sums};
 use nalgebra::Vector3;
 
@@ -85,24 +86,14 @@ impl Account {
             self.handed,
         ];
         let miss = now - self.grains_before - entries.iter().sum::<Vector3<f64>>();
-        over(miss, entries.into_iter().chain([now, self.grains_before]))
+        miss_over(miss, entries.iter().chain([&now, &self.grains_before]))
     }
 
     /// Error of what the relaxation gave to both sides, `owed` being what the continuum has still to take, over the
     /// largest entry.
     pub fn exchange_error(&self, owed: Vector3<f64>) -> f64 {
         let miss = self.relaxation + self.answer + owed + self.settled;
-        over(miss, [self.relaxation, self.weight].into_iter())
-    }
-}
-
-/// The largest part of a miss over the largest of all entries.
-fn over(miss: Vector3<f64>, entries: impl Iterator<Item = Vector3<f64>>) -> f64 {
-    let largest = entries.fold(0.0, |most: f64, entry| most.max(entry.amax()));
-    if largest > 0.0 {
-        miss.amax() / largest
-    } else {
-        miss.amax()
+        miss_over(miss, [&self.relaxation, &self.weight])
     }
 }
 

@@ -7,24 +7,16 @@ use super::account::{self, Account, Monitors};
 use super::cells::Cells;
 use super::journey::Journey;
 use super::zone::Zone;
-use super::{Bowl, BowlSpec, Layout, OverlapError, continuum};
+use super::{Bowl, BowlSpec, Layout, OverlapError};
+use crate::overlap::joint::{flat, vectors};
 use crate::overlap::sighting::free_mass;
+use crate::overlap::state_rows;
 use colluvium_continuum::free_surface::SpaceState;
 use colluvium_dem::Simulation;
 use nalgebra::{Matrix3, Vector3};
 
 /// Numbers in front but for the four rows of forces and moments by cell, the account among them.
 const FRONT: usize = 4 + 12 + 6 + account::NUMBERS;
-
-/// Vectors one behind the other.
-fn flat(rows: &[Vector3<f64>]) -> impl Iterator<Item = f64> {
-    rows.iter().flat_map(|row| [row.x, row.y, row.z])
-}
-
-fn vectors(numbers: &[f64]) -> Vec<Vector3<f64>> {
-    let rows = numbers.as_chunks::<3>().0;
-    rows.iter().map(|row| Vector3::from(*row)).collect()
-}
 
 impl Bowl {
     /// What every load changes.
@@ -33,17 +25,18 @@ impl Bowl {
         let mut front = Vec::with_capacity(FRONT + 12 * cells);
         front.extend([
             cells as f64,
-            self.made as f64,
-            self.laid_at as f64,
+            self.joint.made as f64,
+            self.joint.laid_at as f64,
             self.monitors.grain_steps,
         ]);
-        for given in [&self.laid, &self.given] {
+        let all = [&self.joint.laid, &self.joint.given];
+        for given in all {
             front.extend(flat(&[given.traction, given.impedance]));
         }
         front.extend(self.monitors.work);
-        front.extend(self.laid.powers);
+        front.extend(self.joint.laid.powers);
         front.extend(self.account.numbers());
-        for given in [&self.laid, &self.given] {
+        for given in all {
             front.extend(flat(&given.relaxation));
             front.extend(flat(&given.spin));
         }
@@ -63,9 +56,9 @@ impl Bowl {
             memory.push(row.len() as f64);
             memory.extend(row);
         };
-        put(&[self.exchanges as f64, self.layout.height]);
+        put(&[self.joint.exchanges as f64, self.layout.height]);
         put(&self.monitors.numbers());
-        put(&self.windows.numbers());
+        put(&self.joint.windows.numbers());
         put(&self.columns);
         put(&self.moved);
         put(&[self.view.rest.ratio]);
@@ -77,11 +70,11 @@ impl Bowl {
             .flat_map(|s| [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].map(|at| s[at]));
         put(&stress.collect::<Vec<f64>>());
         for row in [
-            &self.held.accelerations,
-            &self.held.spins,
+            &self.joint.accelerations,
+            &self.joint.spins,
             &self.held.traction,
             &self.held.velocity,
-            &self.owed,
+            &self.joint.owed,
         ] {
             put(&flat(row).collect::<Vec<f64>>());
         }
@@ -90,7 +83,7 @@ impl Bowl {
         put(&self.layout.zone.corners());
         put(&[self.start_volume]);
         put(self.unborne.as_slice());
-        continuum::write(self.flow.state(), &mut put);
+        state_rows::write(self.flow.state(), &mut put);
     }
 
     /// Goes on from what was written of a bowl with the same specification; the simulation is the one that was
@@ -200,7 +193,7 @@ impl<'a> Rows<'a> {
             corners: take()?.try_into().ok()?,
             start_volume: *take()?.first()?,
             unborne: *vectors(take()?).first()?,
-            state: continuum::read(&mut take)?,
+            state: state_rows::read(&mut take)?,
         })
     }
 
@@ -243,22 +236,25 @@ impl<'a> Rows<'a> {
         bowl.sums.stress = stresses
             .map(|&[xx, yy, zz, xy, xz, yz]| Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
             .collect();
-        bowl.held.accelerations = vectors(self.accelerations);
-        bowl.held.spins = vectors(self.spins);
+        bowl.joint.accelerations = vectors(self.accelerations);
+        bowl.joint.spins = vectors(self.spins);
         bowl.held.traction = vectors(self.traction);
         bowl.held.velocity = vectors(self.velocity);
         bowl.held.area = self.area.to_vec();
-        bowl.owed = vectors(self.owed);
+        bowl.joint.owed = vectors(self.owed);
         bowl.monitors = Monitors::of(&self.monitors);
         let unfit = || OverlapError::Record("the bowl's window of monitors does not fit".into());
-        bowl.windows.take_up(self.window).ok_or_else(unfit)?;
+        bowl.joint.windows.take_up(self.window).ok_or_else(unfit)?;
         bowl.monitors.grain_steps = scalars[3];
         bowl.monitors.work = [scalars[16], scalars[17], scalars[18]];
-        bowl.laid.powers = [scalars[19], scalars[20], scalars[21]];
-        bowl.exchanges = self.exchanges as u64;
-        bowl.made = scalars[1] as u64;
-        bowl.laid_at = scalars[2] as u64;
-        for (k, given) in [&mut bowl.laid, &mut bowl.given].into_iter().enumerate() {
+        bowl.joint.laid.powers = [scalars[19], scalars[20], scalars[21]];
+        bowl.joint.exchanges = self.exchanges as u64;
+        bowl.joint.made = scalars[1] as u64;
+        bowl.joint.laid_at = scalars[2] as u64;
+        for (k, given) in [&mut bowl.joint.laid, &mut bowl.joint.given]
+            .into_iter()
+            .enumerate()
+        {
             let pair = vectors(&scalars[4 + 6 * k..10 + 6 * k]);
             (given.traction, given.impedance) = (pair[0], pair[1]);
             let row = |n: usize| &forces[3 * self.cells * n..3 * self.cells * (n + 1)];

@@ -60,7 +60,7 @@ impl MaterialEdge {
         let full = hats.iter().filter(|(cell, _)| self.view.is_full(*cell));
         Embedded {
             weight: depth.min(1.0) * full.map(|(_, hat)| hat).sum::<f64>(),
-            velocity,
+            velocity: velocity.into(),
         }
     }
 
@@ -68,7 +68,7 @@ impl MaterialEdge {
     pub(super) fn embedded_time(&self) -> f64 {
         let case = &self.spec.case;
         let natural = (case.rheology.diameter / case.gravity).sqrt();
-        let held = self.steps_of_loads as f64 * self.timestep;
+        let held = self.joint.steps_of_loads as f64 * self.joint.timestep;
         (STOPPING * natural).max(FEWEST * held)
     }
 }

@@ -6,12 +6,13 @@
 use super::account::{self, Account, Monitors};
 use super::rows::{self, Row};
 use super::travel::{Journey, Move};
-use super::{
-    Continuum, GrainZone, MaterialEdge, MaterialEdgeSpec, OverlapError, continuum, layout,
-};
+use super::{Continuum, GrainZone, MaterialEdge, MaterialEdgeSpec, OverlapError, layout};
+use crate::overlap::joint::{flat, vectors};
+use crate::overlap::state_rows;
 use colluvium_continuum::column_collapse::CollapseGround;
 use colluvium_continuum::strain::SPACE_COMPONENTS;
 use colluvium_dem::{Patch, Simulation};
+use nalgebra::Vector2;
 use std::ops::Range;
 
 /// Numbers in front of those of the edges, with the lengths of which they end: how many there are, and steps of grains.
@@ -24,18 +25,17 @@ impl MaterialEdge {
     fn front(&self) -> Vec<f64> {
         let mut front = Vec::with_capacity(FRONT + 6 * self.cells.count());
         let cells = self.cells.count() as f64;
-        front.extend([cells, self.made as f64, self.laid_at as f64]);
-        for given in [&self.laid, &self.given] {
-            front.extend(given.traction);
-            front.extend(given.impedance);
+        front.extend([cells, self.joint.made as f64, self.joint.laid_at as f64]);
+        for given in [&self.joint.laid, &self.joint.given] {
+            front.extend(flat(&[given.traction, given.impedance]));
         }
         front.extend(self.monitors.work);
-        front.extend(self.laid.powers);
+        front.extend(self.joint.laid.powers);
         front.extend(self.account.numbers());
-        front.extend(self.laid.relaxation.as_flattened());
-        front.extend(self.given.relaxation.as_flattened());
-        front.extend(&self.laid.spin);
-        front.extend(&self.given.spin);
+        front.extend(flat(&self.joint.laid.relaxation));
+        front.extend(flat(&self.joint.given.relaxation));
+        front.extend(flat(&self.joint.laid.spin));
+        front.extend(flat(&self.joint.given.spin));
         front
     }
 
@@ -53,13 +53,13 @@ impl MaterialEdge {
             memory.extend(row);
         };
         put(&[
-            self.exchanges as f64,
+            self.joint.exchanges as f64,
             continuum.mass,
             continuum.rest_mass,
             self.held.reach,
         ]);
         put(&self.monitors.numbers());
-        put(&self.windows.numbers());
+        put(&self.joint.windows.numbers());
         put(&self.labels.given);
         put(&self.labels.base);
         let journey = &self.journey;
@@ -80,16 +80,16 @@ impl MaterialEdge {
             put(&strip.numbers());
         }
         put(self.sums.stress.as_flattened());
-        put(self.held.accelerations.as_flattened());
-        put(&self.held.spins);
+        put(&flat(&self.joint.accelerations).collect::<Vec<f64>>());
+        put(&flat(&self.joint.spins).collect::<Vec<f64>>());
         let rows: Vec<f64> = self.held.rows.iter().flat_map(Row::numbers).collect();
         put(&rows);
         put(&self.held.handshake);
-        put(self.owed.as_flattened());
+        put(&flat(&self.joint.owed).collect::<Vec<f64>>());
         put(&[self.view.rest.ratio]);
         put(self.view.rest.strain.as_flattened());
         if keeps {
-            continuum::write(continuum.collapse.flow().state(), &mut put);
+            state_rows::write(continuum.collapse.flow().state(), &mut put);
         }
     }
 
@@ -186,7 +186,7 @@ impl MaterialEdge {
         let Some((&[ratio], strain)) = take().zip(take()) else {
             return Ok(None);
         };
-        let state = keeps.then(|| continuum::read(&mut take));
+        let state = keeps.then(|| state_rows::read(&mut take));
         if state.as_ref().is_some_and(Option::is_none) {
             return Ok(None);
         }
@@ -206,30 +206,32 @@ impl MaterialEdge {
             return Ok(None);
         }
         edge.sums.stress = stress.as_chunks::<3>().0.to_vec();
-        edge.held.accelerations = accelerations.as_chunks::<2>().0.to_vec();
-        edge.held.spins = spins.to_vec();
+        edge.joint.accelerations = vectors(accelerations);
+        edge.joint.spins = vectors(spins);
         let numbers = edge_rows.as_chunks::<{ rows::NUMBERS }>().0;
         edge.held.rows = numbers.iter().map(Row::of).collect();
         edge.held.handshake = handshake.to_vec();
         edge.held.reach = reach;
-        edge.owed = owed.as_chunks::<2>().0.to_vec();
-        if edge.windows.take_up(window).is_none() {
+        edge.joint.owed = vectors(owed);
+        if edge.joint.windows.take_up(window).is_none() {
             return Ok(None);
         }
         edge.monitors = Monitors::of(monitors);
         edge.monitors.work = [scalars[11], scalars[12], scalars[13]];
-        edge.exchanges = exchanges as u64;
-        edge.made = scalars[1] as u64;
-        edge.laid_at = scalars[2] as u64;
-        for (k, given) in [&mut edge.laid, &mut edge.given].into_iter().enumerate() {
+        edge.joint.exchanges = exchanges as u64;
+        edge.joint.made = scalars[1] as u64;
+        edge.joint.laid_at = scalars[2] as u64;
+        for (k, given) in [&mut edge.joint.laid, &mut edge.joint.given]
+            .into_iter()
+            .enumerate()
+        {
             let n = &scalars[3 + 4 * k..];
-            given.traction = [n[0], n[1]];
-            given.impedance = [n[2], n[3]];
-            let own = &forces[2 * cells * k..2 * cells * (k + 1)];
-            given.relaxation = own.as_chunks::<2>().0.to_vec();
-            given.spin = forces[cells * (4 + k)..cells * (5 + k)].to_vec();
+            given.traction = Vector2::new(n[0], n[1]);
+            given.impedance = Vector2::new(n[2], n[3]);
+            given.relaxation = vectors(&forces[2 * cells * k..2 * cells * (k + 1)]);
+            given.spin = vectors(&forces[cells * (4 + k)..cells * (5 + k)]);
         }
-        edge.laid.powers = [scalars[14], scalars[15], scalars[16]];
+        edge.joint.laid.powers = [scalars[14], scalars[15], scalars[16]];
         edge.account = Account::of(account);
         if let Some(state) = state.flatten() {
             continuum.collapse.set_state(state)?;
