@@ -10,12 +10,13 @@
 //! curl), until the next exchange, Δt later. What they give is laid as forces on the grains, booked while it acts ([`Given`]), and *owed*
 //! by the continuum, which takes the opposite in its next step.
 
+use super::cell_monitors::CellMonitors;
 use super::joint::{LEAST_BUFFER, acting, in_three, towards, vector_over};
 use super::settings::Resolved;
 use super::slips::Slip;
 use super::windows::Windows;
 use colluvium_dem::Simulation;
-use nalgebra::SVector;
+use nalgebra::{ArrayStorage, SVector};
 
 /// Sums of forces that are laid (N), or of their impulses since the last exchange (N s).
 #[derive(Clone, Debug, PartialEq)]
@@ -50,6 +51,46 @@ impl<const D: usize, const S: usize> Given<D, S> {
     }
 }
 
+/// The shell at a row or face of the edge, where grains with shares q of their masses bear what the continuum presses with.
+#[derive(Clone, Copy, Debug, PartialEq)]
+pub(super) struct Shell<const D: usize> {
+    /// Σ q h (kg).
+    pub weight: f64,
+    /// Σ q h (v − u), u the continuum's velocity at the grain (N s).
+    slip: SVector<f64, D>,
+    /// Σ q h v (N s).
+    momentum: SVector<f64, D>,
+    /// What presses on it and on those that it bears for (N).
+    pub force: SVector<f64, D>,
+}
+
+impl<const D: usize> Shell<D> {
+    /// No grains.
+    pub const NONE: Self = Self {
+        weight: 0.0,
+        slip: SVector::from_array_storage(ArrayStorage([[0.0; D]])),
+        momentum: SVector::from_array_storage(ArrayStorage([[0.0; D]])),
+        force: SVector::from_array_storage(ArrayStorage([[0.0; D]])),
+    };
+
+    /// Adds a grain's share q h (kg) with its velocity and the continuum's there (m/s).
+    pub fn add(&mut self, share: f64, velocity: SVector<f64, D>, continuum: SVector<f64, D>) {
+        self.weight += share;
+        self.slip += share * (velocity - continuum);
+        self.momentum += share * velocity;
+    }
+
+    /// Mean of v − u (m/s).
+    pub fn slip(&self) -> SVector<f64, D> {
+        vector_over(self.slip, self.weight)
+    }
+
+    /// Mean of v (m/s).
+    pub fn velocity(&self) -> SVector<f64, D> {
+        vector_over(self.momentum, self.weight)
+    }
+}
+
 /// What both sides do to each other, and when.
 #[derive(Clone, Debug)]
 pub(super) struct CellJoint<const D: usize, const S: usize> {
@@ -65,6 +106,7 @@ pub(super) struct CellJoint<const D: usize, const S: usize> {
     pub laid_at: u64,
     /// Impulse that the continuum has still to take from the relaxation (N s).
     pub owed: Vec<SVector<f64, D>>,
+    pub monitors: CellMonitors,
     /// The window of slip and relaxation that is open.
     pub windows: Windows,
     /// Steps for which loads are held, how often until an exchange, and how often since the last one.
@@ -87,6 +129,7 @@ impl<const D: usize, const S: usize> CellJoint<D, S> {
             given: Given::nothing(cells),
             laid_at: simulation.steps_done(),
             owed: vec![SVector::zeros(); cells],
+            monitors: CellMonitors::default(),
             windows: Windows::new(D, [cells, edge], settings),
             steps_of_loads: settings.steps_of_loads(timestep),
             loads_of_exchange: settings.loads_of_exchange(timestep),
@@ -113,9 +156,9 @@ impl<const D: usize, const S: usize> CellJoint<D, S> {
     }
 
     /// Books the impulses of what was laid over the steps made since, and the work of it; says what the relaxation gave (N s).
-    pub fn book(&mut self, simulation: &Simulation, work: &mut [f64; 3]) -> SVector<f64, D> {
+    pub fn book(&mut self, simulation: &Simulation) -> SVector<f64, D> {
         let time = self.acting(simulation);
-        for (work, power) in work.iter_mut().zip(self.laid.powers) {
+        for (work, power) in self.monitors.work.iter_mut().zip(self.laid.powers) {
             *work += power * time;
         }
         let (given, laid) = (&mut self.given, &self.laid);
@@ -186,6 +229,21 @@ impl<const D: usize, const S: usize> CellJoint<D, S> {
                 ),
                 false => (SVector::zeros(), SVector::zeros()),
             };
+        }
+    }
+
+    /// Takes in an exchange: forces through the handshake surface (N), grains that have escaped, and temperatures (m²/s²).
+    pub fn watch(&mut self, force: [f64; 2], escaped: usize, temperatures: [f64; 3]) {
+        let dt = self.exchange_time();
+        self.windows.pass(dt, &mut self.monitors.windows);
+        self.monitors.take(force, escaped, temperatures);
+    }
+
+    /// What the monitors have seen, with the window that is open.
+    pub fn seen(&self) -> CellMonitors {
+        CellMonitors {
+            windows: self.windows.closed(&self.monitors.windows),
+            ..self.monitors
         }
     }
 

@@ -26,6 +26,8 @@ mod angular;
 mod averages;
 pub mod bowl;
 mod cell_joint;
+mod cell_memory;
+mod cell_monitors;
 mod dense_limits;
 mod edge;
 mod exchange;

@@ -107,11 +107,11 @@ pub fn calm(specs: &[MaterialEdgeSpec]) -> ([f64; 2], f64, f64, Joined) {
     let edges = joined.zone.edges().iter();
     let monitors: Vec<Monitors> = edges.map(|edge| edge.monitors()).collect();
     let escaped = monitors.iter().map(|m| m.escaped).sum();
-    for m in &monitors {
+    for (edge, m) in joined.zone.edges().iter().zip(&monitors) {
         println!(
             "uncoupled {uncoupled}: force ratio {:.3}, packing {:.3}, slip {:.1e}, escaped {}",
             m.force_ratio(),
-            m.packing_ratio(),
+            edge.packing_ratio(),
             m.mean_slip(),
             m.escaped
         );

@@ -273,7 +273,7 @@ fn rest(uncoupled: bool, time: f64) -> Calm {
     println!(
         "force ratio {:.3}, packing {:.3}, slip {:.1e}, fastest {:?}",
         monitors.force_ratio(),
-        monitors.packing_ratio(),
+        joined.edge().packing_ratio(),
         monitors.mean_slip(),
         fastest.map(|g| (g.position, g.velocity))
     );

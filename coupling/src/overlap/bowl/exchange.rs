@@ -4,29 +4,17 @@ use super::continuum::{components, sideways};
 use super::gradients::{gradient, rotation};
 use super::{Bowl, OverlapError};
 use crate::overlap::angular::{AngularBook, Counterpart, Parts};
-use crate::overlap::joint::{self, inertia, vector_over as over};
+use crate::overlap::cell_joint::Shell;
+use crate::overlap::joint::{self, inertia};
 use crate::overlap::slips::{Met, compare};
 use colluvium_dem::{GrainSample, Load, Simulation};
 use nalgebra::Vector3;
-
-/// The shell's weight at a face of the box, and its slip.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Shell {
-    /// Σ q h (kg).
-    pub weight: f64,
-    /// Σ q h (v − u), u the continuum's velocity at the grain (N s).
-    pub slip: Vector3<f64>,
-    /// Σ q h v (N s).
-    momentum: Vector3<f64>,
-    /// What presses on it and on those above it without grains (N).
-    force: Vector3<f64>,
-}
 
 /// Room for what is formed and forgotten in a step.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     near: Vec<GrainSample>,
-    pub(super) shell: Vec<Shell>,
+    pub(super) shell: Vec<Shell<3>>,
     loads: Vec<Load>,
 }
 
@@ -57,10 +45,8 @@ impl Bowl {
 
     /// Books the impulses of what was laid over the steps made since.
     pub(super) fn book_grains(&mut self, simulation: &Simulation) {
-        self.monitors.grain_steps +=
-            simulation.grain_count() as f64 * self.joint.steps_of_loads as f64;
-        let work = &mut self.monitors.work;
-        self.account.relaxation += self.joint.book(simulation, work);
+        self.grain_steps += simulation.grain_count() as f64 * self.joint.steps_of_loads as f64;
+        self.account.relaxation += self.joint.book(simulation);
         self.account.weight += self.weight_until_now(simulation);
     }
 
@@ -175,23 +161,20 @@ impl Bowl {
     /// Weights and slips of the shell, face by face.
     fn weigh(&self, scratch: &mut Scratch) {
         scratch.shell.clear();
-        scratch.shell.resize(self.faces.all.len(), Shell::default());
+        scratch.shell.resize(self.faces.all.len(), Shell::NONE);
         for grain in &scratch.near {
             let hats = self.layout.cells.hats(&grain.position);
             let beside = self.view.velocity_at(&hats);
             for (face, part) in self.shares(grain) {
-                let shell = &mut scratch.shell[face];
-                shell.weight += part;
                 let u = beside.unwrap_or(self.held.velocity[face]);
-                shell.slip += part * (grain.velocity - u);
-                shell.momentum += part * grain.velocity;
+                scratch.shell[face].add(part, grain.velocity, u);
             }
         }
     }
 
     /// What presses on each face, on the grains that bear it: its own, or those of the next face below with grains. Says where
     /// the continuum has it.
-    fn press_on_shell(&mut self, shells: &mut [Shell]) -> Counterpart {
+    fn press_on_shell(&mut self, shells: &mut [Shell<3>]) -> Counterpart {
         let mut answer = Counterpart::default();
         let impedance = self.spec.settings.impedance;
         for number in 0..self.faces.all.len() {
@@ -201,14 +184,14 @@ impl Bowl {
                 bearer = self.faces.all[face].below;
             }
             let Some(bearer) = bearer else { continue };
-            let slip = over(shells[bearer].slip, shells[bearer].weight);
+            let slip = shells[bearer].slip();
             let axis = self.layout.zone.sides[side].axis;
             let mut resistance = Vector3::zeros();
             resistance[axis] = -impedance * self.held.area[number] * slip[axis];
             shells[bearer].force += self.held.traction[number] + resistance;
             self.joint.laid.traction += self.held.traction[number];
             self.joint.laid.impedance += resistance;
-            let velocity = over(shells[bearer].momentum, shells[bearer].weight);
+            let velocity = shells[bearer].velocity();
             self.joint.laid.powers[0] += self.held.traction[number].dot(&velocity);
             self.joint.laid.powers[1] += resistance.dot(&velocity);
             let beside = self.faces.all[number].cells;
@@ -318,10 +301,7 @@ impl Bowl {
         let before = self.flow.state().velocity_time;
         while self.flow.state().time < until * (1.0 - 1e-12) {
             let step = self.flow.step(until - self.flow.state().time)?;
-            self.monitors.steps[0] += 1.0;
-            self.monitors.steps[1] += step.active_cells as f64;
-            self.monitors.iterations += step.newton_iterations as f64;
-            self.monitors.residual = self.monitors.residual.max(step.residuals.momentum);
+            self.joint.monitors.take_step(&step);
         }
         // Velocities have moved on by this, half a step ahead of the fractions.
         let pushed = (self.flow.state().velocity_time - before) * unit;
@@ -340,12 +320,12 @@ impl Bowl {
         self.view
             .look(&self.flow, &self.layout.cells, &self.units, 0.0);
         let before = self.flow.state().clone();
-        let (account, monitors) = (self.account, self.monitors);
+        let (account, monitors) = (self.account, self.joint.monitors);
         let rest = self.view.rest.clone();
         self.step_continuum(self.exchange_time(), 1)?;
         self.flow.set_state(before)?;
         self.view.rest = rest;
-        (self.account, self.monitors) = (account, monitors);
+        (self.account, self.joint.monitors) = (account, monitors);
         Ok(())
     }
 

@@ -36,7 +36,8 @@ mod store;
 mod watch;
 mod zone;
 
-pub use account::{Account, Monitors};
+pub use super::cell_monitors::CellMonitors as Monitors;
+pub use account::Account;
 pub use cells::Cells;
 pub use journey::{Growth, Move};
 pub use zone::Zone;
@@ -261,7 +262,7 @@ pub struct Bowl {
     /// L of all cells after the last exchange (1/s), of a box that grows.
     gradients: Vec<Matrix3<f64>>,
     account: Account,
-    monitors: Monitors,
+    grain_steps: f64,
     sighting: Sighting,
     scratch: exchange::Scratch,
     outside: Outside<3, 5>,
@@ -349,7 +350,7 @@ impl Bowl {
             packings: Vec::new(),
             gradients: vec![Matrix3::zeros(); count],
             account: Account::default(),
-            monitors: Monitors::default(),
+            grain_steps: 0.0,
             sighting: Sighting::default(),
             scratch: exchange::Scratch::default(),
             outside: Outside::nothing(count),
@@ -479,10 +480,12 @@ impl Bowl {
 
     /// What the monitors have seen, with the window that is open.
     pub fn monitors(&self) -> Monitors {
-        Monitors {
-            windows: self.joint.windows.closed(&self.monitors.windows),
-            ..self.monitors
-        }
+        self.joint.seen()
+    }
+
+    /// Grains times their steps.
+    pub fn grain_steps(&self) -> f64 {
+        self.grain_steps
     }
 
     /// Farthest that grains have moved through a face of the box in the mean, outwards positive (m).

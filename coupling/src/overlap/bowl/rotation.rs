@@ -1,7 +1,6 @@
 //! Uniform translation and rigid rotation of both sides at once exchange no force.
 
 use super::*;
-use crate::overlap::joint::vector_over as over;
 use crate::overlap::{OverlapSettings, Scales};
 use colluvium_dem::{ContactLaw, Domain, Grain, Hooke, Setup, TangentialSpring, Threads, Wall};
 
@@ -115,9 +114,7 @@ fn exchanged(bowl: &Bowl) -> [f64; 3] {
     [
         largest(&bowl.joint.accelerations),
         largest(&bowl.joint.spins),
-        slips.fold(0.0, |most: f64, (_, s)| {
-            most.max(over(s.slip, s.weight).norm())
-        }),
+        slips.fold(0.0, |most: f64, (_, s)| most.max(s.slip().norm())),
     ]
 }
 

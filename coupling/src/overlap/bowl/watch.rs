@@ -84,7 +84,7 @@ impl Bowl {
         let belongs = self.spec.belongs();
         let escaped = self.sighting.snapshot.grains.iter();
         let escaped = escaped.filter(|g| belongs(g) && zone.label(cells, &g.position) < beyond);
-        let escaped = escaped.count() as f64;
+        let escaped = escaped.count();
         let filled = FILLED * self.full();
         for (moved, face) in self.moved.iter_mut().zip(&self.faces.all) {
             let side = &zone.sides[face.side];
@@ -97,15 +97,6 @@ impl Bowl {
         }
         let widths = self.layout.widths;
         let temperatures = temperatures(self.labelled(), widths, |g| self.fluctuation(g));
-        let m = &mut self.monitors;
-        self.joint.windows.pass(dt, &mut m.windows);
-        for (sum, temperature) in m.temperature.iter_mut().zip(temperatures) {
-            *sum += temperature;
-        }
-        m.exchanges += 1.0;
-        for (sum, force) in m.force.iter_mut().zip(force) {
-            *sum += force;
-        }
-        m.escaped = m.escaped.max(escaped);
+        self.joint.watch(force, escaped, temperatures);
     }
 }

@@ -1,8 +1,7 @@
-//! What grains and continuum give each other, and what the monitors say.
+//! What grains and continuum give each other.
 
 use super::side::Side;
 use crate::overlap::joint::miss_over;
-use crate::overlap::windows::{self, Of, Sums};
 use nalgebra::Vector2;
 
 /// Momentum along x and z since the start (N s), and masses (kg).
@@ -131,142 +130,14 @@ impl Account {
     }
 }
 
-/// Sums over the exchanges for means in time.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Monitors {
-    /// Exchanges seen.
-    pub exchanges: f64,
-    /// Σ of the force along x through the handshake surface, of what crosses it as grains and of the continuum's stress (N).
-    pub force: [f64; 2],
-    /// Σ of the grains' mass in the full cells of the overlap, over that of the continuum in them.
-    pub packing: f64,
-    /// Most grains beyond the edge by more than a diameter along its normal.
-    pub escaped: f64,
-    /// Steps of the continuum, and active cells in them.
-    pub steps: [f64; 2],
-    /// Largest residual of the continuum's momentum.
-    pub residual: f64,
-    /// Newton iterations of the continuum's steps, and how often one was cut and tried again.
-    pub newton: [f64; 2],
-    /// Labels renewed.
-    pub renewed: f64,
-    /// Σ of the granular temperature ⟨v′²⟩/3 of the buffer, of the inner overlap, and of as much of the grains beyond it
-    /// (m²/s²).
-    pub temperature: [f64; 3],
-    /// Work on the grains of the traction, of the impedance, and of the relaxation with what carries those that lie in the
-    /// continuum (J), by velocities when they are laid; negative where it takes energy from them.
-    pub work: [f64; 3],
-    /// Sizes of slip and relaxation.
-    pub(in crate::overlap) windows: Sums,
-}
-
-/// Numbers of the monitors without those of the windows, and with them.
-const OWN: usize = 17;
-/// See `OWN`.
-pub const MONITORED: usize = OWN + windows::NUMBERS;
-
-impl Monitors {
-    /// All of it in a row of numbers.
-    pub fn numbers(&self) -> [f64; MONITORED] {
-        let own: [f64; OWN] = [
-            self.exchanges,
-            self.force[0],
-            self.force[1],
-            self.packing,
-            self.escaped,
-            self.steps[0],
-            self.steps[1],
-            self.residual,
-            self.newton[0],
-            self.newton[1],
-            self.renewed,
-            self.temperature[0],
-            self.temperature[1],
-            self.temperature[2],
-            self.work[0],
-            self.work[1],
-            self.work[2],
-        ];
-        let windows = self.windows.numbers();
-        std::array::from_fn(|k| match k.checked_sub(OWN) {
-            None => own[k],
-            Some(k) => windows[k],
-        })
-    }
-
-    /// From such numbers.
-    pub fn of(n: &[f64; MONITORED]) -> Self {
-        Self {
-            exchanges: n[0],
-            force: [n[1], n[2]],
-            packing: n[3],
-            escaped: n[4],
-            steps: [n[5], n[6]],
-            residual: n[7],
-            newton: [n[8], n[9]],
-            renewed: n[10],
-            temperature: [n[11], n[12], n[13]],
-            work: [n[14], n[15], n[16]],
-            windows: Sums::from_numbers(&std::array::from_fn(|k| n[OWN + k])),
-        }
-    }
-
-    /// Size of the slip at the handshake surface, by means over windows in time ([`windows`]), mean over cells and windows (m/s).
-    pub fn mean_slip(&self) -> f64 {
-        self.windows.of(Of::Slip).mean()
-    }
-
-    /// What the noise of the grains' velocities alone would make it (m/s).
-    pub fn slip_noise(&self) -> f64 {
-        self.windows.of(Of::Slip).noise()
-    }
-
-    /// Largest mean of one window (m/s).
-    pub fn largest_slip(&self) -> f64 {
-        self.windows.of(Of::Slip).largest
-    }
-
-    /// Mean forces along x of grains and continuum through the handshake surface (N).
-    pub fn forces(&self) -> [f64; 2] {
-        self.force.map(|sum| sum / self.exchanges.max(1.0))
-    }
-
-    /// Force of the grains over that of the continuum at the handshake surface.
-    pub fn force_ratio(&self) -> f64 {
-        self.force[0] / self.force[1]
-    }
-
-    /// Mean granular temperatures of the buffer, the inner overlap and the grains beyond it (m²/s²).
-    pub fn temperatures(&self) -> [f64; 3] {
-        self.temperature.map(|sum| sum / self.exchanges.max(1.0))
-    }
-
-    /// Mass of the grains in the overlap over that of the continuum there.
-    pub fn packing_ratio(&self) -> f64 {
-        self.packing / self.exchanges.max(1.0)
-    }
-
-    /// Impulse of the relaxation, cell by cell, over that of the traction, row by row, by sizes of means over windows.
-    pub fn relaxation_share(&self) -> f64 {
-        self.windows.of(Of::Relaxation).size / self.windows.of(Of::Traction).size
-    }
-
-    /// What the noise of the grains' velocities alone would make it.
-    pub fn relaxation_noise(&self) -> f64 {
-        self.windows.of(Of::Relaxation).floor / self.windows.of(Of::Traction).size
-    }
-}
-
 #[cfg(test)]
 mod tests {
     use super::*;
 
     #[test]
-    fn accounts_and_monitors_come_back_from_their_numbers() {
+    fn an_account_comes_back_from_its_numbers() {
         let numbers: [f64; NUMBERS] = std::array::from_fn(|k| k as f64 + 0.5);
         assert_eq!(Account::of(&numbers).numbers(), numbers);
-        let numbers: [f64; MONITORED] = std::array::from_fn(|k| k as f64 + 0.5);
-        assert_eq!(Monitors::of(&numbers).numbers(), numbers);
     }
 
     #[test]

@@ -5,7 +5,7 @@
 //! turned back where it is put together with what the keeper does. A cell bears the grains of that edge which has more of them there;
 //! forces of both are added.
 
-use super::account::{Account, Monitors};
+use super::account::Account;
 use super::cells::Cells;
 use super::copy::ROUNDED;
 use super::side::{Side, mirror_rows};
@@ -228,12 +228,7 @@ impl Continuum {
         let before = self.collapse.flow().state().velocity_time;
         while self.collapse.time() < until * (1.0 - 1e-12) {
             let step = self.collapse.step(until)?;
-            let seen: &mut Monitors = &mut keeper.monitors;
-            seen.steps[0] += 1.0;
-            seen.steps[1] += step.active_cells as f64;
-            seen.newton[0] += step.newton_iterations as f64;
-            seen.newton[1] += step.cuts as f64;
-            seen.residual = seen.residual.max(step.residuals.momentum);
+            keeper.joint.monitors.take_step(&step);
         }
         // Velocities have moved on by this, half a step ahead of the fractions.
         let pushed = (self.collapse.flow().state().velocity_time - before) * unit;
@@ -258,11 +253,14 @@ impl Continuum {
             edge.look_at(self);
         }
         let before = self.collapse.flow().state().clone();
-        let books: Vec<_> = edges.iter().map(|e| (e.account, e.monitors)).collect();
+        let books: Vec<_> = edges
+            .iter()
+            .map(|e| (e.account, e.joint.monitors))
+            .collect();
         self.step(edges, 1)?;
         self.collapse.set_state(before)?;
         for (edge, book) in edges.iter_mut().zip(books) {
-            (edge.account, edge.monitors) = book;
+            (edge.account, edge.joint.monitors) = book;
         }
         Ok(())
     }

@@ -1,14 +1,16 @@
 //! The steps: grains under what is held, and the exchange that follows so many of them.
 
 use super::embedded::Embedded;
-use super::rows::{Load, Row, bearers, slopes};
+use super::rows::{Row, bearers, slopes};
+use super::side::in_slab;
 use super::{Continuum, MaterialEdge, OverlapError, Side};
 use crate::overlap::angular::{AngularBook, Counterpart, Parts};
-use crate::overlap::joint::{self, inertia, over};
+use crate::overlap::cell_joint::Shell;
+use crate::overlap::joint::{self, along_axes, inertia};
 use crate::overlap::slips::{Met, compare};
 use colluvium_continuum::units::Units;
-use colluvium_dem::{GrainSample, Load as Laid, Simulation};
-use nalgebra::{Vector1, Vector3};
+use colluvium_dem::{GrainSample, Load, Simulation};
+use nalgebra::{Vector1, Vector2, Vector3};
 
 /// Rows with less than this of a full row of shell hand on what presses on them: a force on few grains throws them out.
 pub(super) const LEAST_ROW: f64 = 0.3;
@@ -19,28 +21,21 @@ pub(super) const STEEPEST: f64 = 2.0;
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     near: Vec<(GrainSample, f64, Embedded)>,
-    pub(super) shell: Vec<Load>,
+    pub(super) shell: Vec<Shell<2>>,
     bearers: Vec<usize>,
-    forces: Vec<[f64; 2]>,
-}
-
-/// A vector of the plane x–z in space.
-fn in_slab([x, z]: [f64; 2]) -> Vector3<f64> {
-    Vector3::new(x, 0.0, z)
 }
 
 impl MaterialEdge {
     /// Books the impulses of what was laid over the steps made since.
     pub(super) fn book_grains(&mut self, simulation: &Simulation) {
-        let work = &mut self.monitors.work;
-        self.account.relaxation += self.joint.book(simulation, work);
+        self.account.relaxation += self.joint.book(simulation);
     }
 
     /// Forms the loads of the next steps, along x, in the order of the grains' numbers, noting what they consist of.
     pub(super) fn lay(
         &mut self,
         simulation: &Simulation,
-        loads: &mut Vec<Laid>,
+        loads: &mut Vec<Load>,
         mut angular: Option<&mut AngularBook>,
     ) {
         self.joint.lay_anew(simulation);
@@ -48,6 +43,7 @@ impl MaterialEdge {
             return;
         }
         let side = self.spec.side;
+        let in_space = |v: Vector2<f64>| side.turned(in_slab(v));
         let (shell, buffer) = (self.spec.settings.shell, self.spec.settings.buffer);
         let mut scratch = std::mem::take(&mut self.scratch);
         let reach = self.held.reach;
@@ -62,12 +58,11 @@ impl MaterialEdge {
         );
         // Rows may stand in another order after a restart, and sums over them end in other bits.
         scratch.near.sort_unstable_by_key(|(grain, ..)| grain.id);
-        let rows = self.held.rows.len();
         let weight = |grain: &GrainSample, label: f64, embedded: &Embedded| {
             (1.0 - embedded.weight) * grain.mass * ((shell - label) / shell).clamp(0.0, 1.0)
         };
         scratch.shell.clear();
-        scratch.shell.resize(rows, Load::default());
+        scratch.shell.resize(self.held.rows.len(), Shell::NONE);
         for (grain, label, embedded) in &scratch.near {
             let q = weight(grain, *label, embedded);
             if q <= 0.0 {
@@ -76,40 +71,32 @@ impl MaterialEdge {
             let hats = self.cells.hats(grain.position.x, grain.position.z);
             let beside = self.view.velocity_at(&hats);
             for (row, hat) in self.cells.rows(grain.position.z) {
-                let [u, w] = beside.map_or(self.held.rows[row].velocity, Into::into);
-                let load = &mut scratch.shell[row];
-                load.weight += q * hat;
-                load.slip[0] += q * hat * (grain.velocity.x - u);
-                load.slip[1] += q * hat * (grain.velocity.z - w);
-                load.momentum[0] += q * hat * grain.velocity.x;
-                load.momentum[1] += q * hat * grain.velocity.z;
+                let u = beside.unwrap_or(self.held.rows[row].velocity);
+                scratch.shell[row].add(q * hat, along_axes(&grain.velocity), u);
             }
         }
         let full = 0.5 * self.spec.density() * shell * self.cells.spacing * self.spec.slab;
         let least = LEAST_ROW * full;
         bearers(&scratch.shell, least, &mut scratch.bearers);
         let mut pressed = Counterpart::default();
-        scratch.forces.clear();
-        scratch.forces.resize(rows, [0.0; 2]);
         for (k, row) in self.held.rows.iter().enumerate() {
             let bearer = scratch.bearers[k];
             if bearer == usize::MAX {
                 continue;
             }
-            let load = &scratch.shell[bearer];
-            let slip = load.slip.map(|p| over(p, load.weight));
-            let impedance = row.impedance(self.spec.settings.impedance, slip);
-            let force = [0, 1].map(|axis| row.traction[axis] + impedance[axis]);
-            let at = [row.place, self.cells.height(k)];
-            let [at, on_face] = [at, force].map(|v| in_slab(side.in_plane(v)));
+            let load = &mut scratch.shell[bearer];
+            let impedance = row.impedance(self.spec.settings.impedance, load.slip());
+            let at = Vector2::new(row.place, self.cells.height(k));
+            let [at, on_face] = [at, row.traction + impedance].map(in_space);
             pressed.add(0, &at, &on_face);
-            let velocity = load.momentum.map(|p| over(p, load.weight));
-            for (axis, (traction, impedance)) in row.traction.iter().zip(impedance).enumerate() {
-                self.joint.laid.powers[0] += traction * velocity[axis];
-                self.joint.laid.powers[1] += impedance * velocity[axis];
-                scratch.forces[bearer][axis] += traction + impedance;
-                self.joint.laid.traction[axis] += traction;
-                self.joint.laid.impedance[axis] += impedance;
+            let velocity = load.velocity();
+            load.force += row.traction + impedance;
+            let laid = &mut self.joint.laid;
+            laid.traction += row.traction;
+            laid.impedance += impedance;
+            for (axis, velocity) in velocity.iter().enumerate() {
+                laid.powers[0] += row.traction[axis] * velocity;
+                laid.powers[1] += impedance[axis] * velocity;
             }
         }
         let gravity = side.turned(simulation.gravity());
@@ -117,14 +104,12 @@ impl MaterialEdge {
         let mut relaxation = 0.0;
         for (grain, label, embedded) in &scratch.near {
             let q = weight(grain, *label, embedded);
-            let mut force = [0.0; 2];
+            let mut force = Vector2::zeros();
             if q > 0.0 {
                 for (row, hat) in self.cells.rows(grain.position.z) {
-                    let all = scratch.shell[row].weight;
-                    if all > least {
-                        for (sum, part) in force.iter_mut().zip(scratch.forces[row]) {
-                            *sum += q * hat / all * part;
-                        }
+                    let shell = &scratch.shell[row];
+                    if shell.weight > least {
+                        force += q * hat / shell.weight * shell.force;
                     }
                 }
             }
@@ -138,26 +123,24 @@ impl MaterialEdge {
                 let turn = hat * turned * self.joint.spins[cell][0];
                 self.joint.laid.spin[cell][0] += turn;
                 moment += turn;
-                let laid = &mut self.joint.laid.relaxation[cell];
-                for axis in 0..2 {
-                    let relaxed = relaxed * self.joint.accelerations[cell][axis];
-                    let pull = hat * (relaxed + [carried.x, carried.z][axis]);
-                    laid[axis] += pull;
-                    force[axis] += pull;
-                    relaxation += pull * [grain.velocity.x, grain.velocity.z][axis];
-                }
+                let relaxed = relaxed * self.joint.accelerations[cell];
+                let pull = hat * (relaxed + along_axes(&carried));
+                self.joint.laid.relaxation[cell] += pull;
+                force += pull;
+                relaxation += pull[0] * grain.velocity.x;
+                relaxation += pull[1] * grain.velocity.z;
             }
             relaxation += moment * grain.spin.y;
-            if force != [0.0; 2] || carried.y != 0.0 || moment != 0.0 {
+            if force != Vector2::zeros() || carried.y != 0.0 || moment != 0.0 {
                 let moment = side.turned_about(Vector3::y() * moment);
                 let all = side.turned([force[0], carried.y, force[1]].into());
-                loads.push(Laid {
+                loads.push(Load {
                     grain: grain.id,
                     force: all,
                     moment,
                 });
                 if let Some(book) = &mut angular {
-                    let traction = in_slab(side.in_plane(traction));
+                    let traction = in_space(traction);
                     let parts = Parts {
                         traction,
                         relaxation: all - traction,
@@ -171,11 +154,9 @@ impl MaterialEdge {
         if let Some(book) = angular {
             let columns = self.cells.counts[0];
             for (cell, force) in self.joint.laid.relaxation.iter().enumerate() {
-                let at = [
-                    self.cells.centre(cell % columns),
-                    self.cells.height(cell / columns),
-                ];
-                let [at, on_cell] = [at, (*force).into()].map(|v| in_slab(side.in_plane(v)));
+                let (i, k) = (cell % columns, cell / columns);
+                let at = Vector2::new(self.cells.centre(i), self.cells.height(k));
+                let [at, on_cell] = [at, *force].map(in_space);
                 pressed.add(1, &at, &on_cell);
             }
             book.answered_by(&pressed);
@@ -357,10 +338,9 @@ impl MaterialEdge {
                 continue;
             };
             let slope = slopes[k].clamp(-STEEPEST, STEEPEST);
-            let area = [-h * slab * fraction, h * slab * fraction * slope];
-            row.area = area;
-            row.velocity = velocity.into();
-            row.traction = [xx * area[0] + xz * area[1], xz * area[0] + zz * area[1]];
+            let area = Vector2::new(-h * slab * fraction, h * slab * fraction * slope);
+            (row.area, row.velocity) = (area, velocity);
+            row.traction = Vector2::new(xx * area[0] + xz * area[1], xz * area[0] + zz * area[1]);
         }
     }
 

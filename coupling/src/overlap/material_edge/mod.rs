@@ -46,7 +46,8 @@ mod watch;
 mod witness;
 mod zone;
 
-pub use account::{Account, Monitors};
+pub use super::cell_monitors::CellMonitors as Monitors;
+pub use account::Account;
 pub use cells::Cells;
 pub use continuum::Continuum;
 pub use floor::LEVEL;
@@ -169,7 +170,10 @@ pub struct MaterialEdge {
     held: Held,
     joint: CellJoint<2, 1>,
     account: Account,
-    monitors: Monitors,
+    /// Σ over exchanges of the grains' mass in the full cells of the overlap, over that of the continuum in them.
+    packed: f64,
+    /// Labels renewed.
+    renewed: f64,
     sighting: Sighting,
     scratch: exchange::Scratch,
     outside: Outside,
@@ -252,7 +256,8 @@ impl MaterialEdge {
             },
             joint: CellJoint::new(cells.count(), cells.counts[1], &spec.settings, simulation),
             account: Account::default(),
-            monitors: Monitors::default(),
+            packed: 0.0,
+            renewed: 0.0,
             sighting: Sighting::default(),
             scratch: exchange::Scratch::default(),
             outside: Outside::nothing(cells.count()),
@@ -315,10 +320,17 @@ impl MaterialEdge {
 
     /// What the monitors have seen, with the window that is open.
     pub fn monitors(&self) -> Monitors {
-        Monitors {
-            windows: self.joint.windows.closed(&self.monitors.windows),
-            ..self.monitors
-        }
+        self.joint.seen()
+    }
+
+    /// Mass of the grains in the overlap over that of the continuum there.
+    pub fn packing_ratio(&self) -> f64 {
+        self.packed / self.joint.monitors.exchanges.max(1.0)
+    }
+
+    /// Labels renewed.
+    pub fn renewed(&self) -> f64 {
+        self.renewed
     }
 
     /// Time between two exchanges (s).

@@ -136,12 +136,9 @@ fn exchanged(edge: &MaterialEdge) -> [f64; 3] {
         .flat_map(|k| &edge.joint.spins[k * columns..(k + 1) * columns]);
     let spins = spins.map(|a| a.amax()).fold(0.0, f64::max);
     let forces = inside.map(|k| {
-        let load = &edge.scratch.shell[k];
-        let slip = load
-            .slip
-            .map(|p| crate::overlap::joint::over(p, load.weight));
-        let force = edge.held.rows[k].impedance(edge.spec.settings.impedance, slip);
-        force[0].hypot(force[1])
+        let row = &edge.held.rows[k];
+        let slip = edge.scratch.shell[k].slip();
+        row.impedance(edge.spec.settings.impedance, slip).norm()
     });
     [
         accelerations.fold(0.0, f64::max),

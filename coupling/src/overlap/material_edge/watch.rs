@@ -3,6 +3,7 @@
 use super::MaterialEdge;
 use super::exchange::STEEPEST;
 use super::rows::slopes;
+use super::side::in_slab;
 use super::witness::Through;
 use crate::overlap::joint::{in_three, over};
 use crate::overlap::slips::{temperatures, variances};
@@ -20,10 +21,8 @@ impl MaterialEdge {
         let variances = variances(self.met(), self.cells.count(), |g| self.fluctuation(g));
         self.joint.watch_relaxation(&variances);
         for (k, row) in self.held.rows.iter().enumerate() {
-            let [x, z] = row.traction.map(|force| force * dt);
-            self.joint
-                .windows
-                .add(Of::Traction, k, [x, z, 0.0], [dt, 0.0]);
+            let impulse = in_three(&(row.traction * dt));
+            self.joint.windows.add(Of::Traction, k, impulse, [dt, 0.0]);
         }
     }
 
@@ -58,7 +57,7 @@ impl MaterialEdge {
         let mut about = grain.velocity;
         for (cell, hat) in self.cells.hats(grain.position.x, grain.position.z) {
             let mean = self.sums.cover[cell].velocity();
-            about -= hat * Vector3::new(mean[0], 0.0, mean[1]);
+            about -= hat * in_slab(mean);
         }
         about
     }
@@ -98,18 +97,11 @@ impl MaterialEdge {
                 cells += 1.0;
             }
         }
-        let escaped = self.escaped() as f64;
+        self.packed += over(packed, cells);
+        let escaped = self.escaped();
         let zones = self.spec.zones();
         let temperatures = temperatures(self.labelled(), zones, |g| self.fluctuation(g));
-        let m = &mut self.monitors;
-        self.joint.windows.pass(dt, &mut m.windows);
-        m.exchanges += 1.0;
-        m.force[0] += through.sum();
-        m.force[1] += (pressed + leaning) * area;
-        m.packing += over(packed, cells);
-        m.escaped = m.escaped.max(escaped);
-        for (sum, temperature) in m.temperature.iter_mut().zip(temperatures) {
-            *sum += temperature;
-        }
+        let force = [through.sum(), (pressed + leaning) * area];
+        self.joint.watch(force, escaped, temperatures);
     }
 }

@@ -389,7 +389,7 @@ impl JoinedColumn<'_> {
             ),
             (
                 "overlap_packing",
-                monitors.packing_ratio(),
+                edge.packing_ratio(),
                 1.0,
                 "mass of the grains in full cells of the overlap over that of the continuum there",
             ),
@@ -451,7 +451,7 @@ impl JoinedColumn<'_> {
             ),
             (
                 "labels_renewed",
-                monitors.renewed,
+                edge.renewed(),
                 "of grains that had left their neighbours in the overlap",
             ),
         ] {
