@@ -25,10 +25,14 @@
 mod angular;
 mod averages;
 pub mod bowl;
+mod cell_joint;
+mod cell_memory;
+mod cell_monitors;
 mod dense_limits;
 mod edge;
 mod exchange;
 mod far_side;
+mod following;
 pub mod force_blending;
 pub mod joined_incline;
 mod joint;
@@ -40,7 +44,9 @@ mod rest_stress;
 mod settings;
 mod shell;
 mod sighting;
+mod slips;
 mod start;
+mod state_rows;
 mod strip;
 pub mod windows;
 

@@ -86,7 +86,7 @@ pub fn books_close(joined: &mut Joined) {
     assert!(grains < 1e-11 && exchange < 1e-11);
     // Without what the continua press with it would not close.
     let mut blind = account;
-    blind.traction = [0.0; 2];
+    blind.traction.fill(0.0);
     assert!(blind.grains_error(now) > 1e-4);
 }
 
@@ -107,11 +107,11 @@ pub fn calm(specs: &[MaterialEdgeSpec]) -> ([f64; 2], f64, f64, Joined) {
     let edges = joined.zone.edges().iter();
     let monitors: Vec<Monitors> = edges.map(|edge| edge.monitors()).collect();
     let escaped = monitors.iter().map(|m| m.escaped).sum();
-    for m in &monitors {
+    for (edge, m) in joined.zone.edges().iter().zip(&monitors) {
         println!(
             "uncoupled {uncoupled}: force ratio {:.3}, packing {:.3}, slip {:.1e}, escaped {}",
             m.force_ratio(),
-            m.packing_ratio(),
+            edge.packing_ratio(),
             m.mean_slip(),
             m.escaped
         );
@@ -210,7 +210,7 @@ pub fn mirror_over(
         let rows = |a: &colluvium_coupling::overlap::material_edge::Account, s: f64| {
             [a.traction, a.impedance, a.relaxation, a.answer]
                 .iter()
-                .flat_map(|[x, z]| [s * x, *z])
+                .flat_map(|v| [s * v[0], v[1]])
                 .collect::<Vec<f64>>()
         };
         let loads = apart(&rows(&one, 1.0), &rows(&other, -1.0));

@@ -101,7 +101,7 @@ fn a_grain_torn_out_of_the_edge_is_carried_by_the_continuum() {
 fn a_grain_that_flies_off_the_edge_is_of_the_shell_no_more() {
     let mut joined = rested(false);
     // What rests is among its neighbours.
-    assert_eq!(joined.edge().monitors().renewed, 0.0);
+    assert_eq!(joined.edge().renewed(), 0.0);
     let shell = joined.simulation.held(|_| true);
     let shell = shell.filter(|g| joined.edge().label(g).is_some_and(|label| label < 1.5));
     let highest = shell.max_by(|a, b| a.position.z.total_cmp(&b.position.z));
@@ -119,6 +119,6 @@ fn a_grain_that_flies_off_the_edge_is_of_the_shell_no_more() {
     assert!(landed.position.x > EDGE + 5.0);
     // It is beyond what anything is exchanged with.
     assert!(label > 6.0, "{label}");
-    assert!(joined.edge().monitors().renewed > 0.0);
+    assert!(joined.edge().renewed() > 0.0);
     assert!(joined.moved(&before) < 0.3);
 }

@@ -273,7 +273,7 @@ fn rest(uncoupled: bool, time: f64) -> Calm {
     println!(
         "force ratio {:.3}, packing {:.3}, slip {:.1e}, fastest {:?}",
         monitors.force_ratio(),
-        monitors.packing_ratio(),
+        joined.edge().packing_ratio(),
         monitors.mean_slip(),
         fastest.map(|g| (g.position, g.velocity))
     );
@@ -367,7 +367,7 @@ fn an_edge_goes_with_the_flow_and_keeps_its_books() {
     assert!(grains < 1e-12 && exchange < 1e-12);
     // Without what the moves handed over, the grains' account would not close.
     let mut blind = account;
-    blind.handed = [0.0; 2];
+    blind.handed.fill(0.0);
     assert!(blind.grains_error(now) > 1e-9);
 }
 

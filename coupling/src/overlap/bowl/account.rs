@@ -1,6 +1,6 @@
-//! What grains and continuum give each other, and what the monitors say.
+//! What grains and continuum give each other.
 
-use crate::overlap::windows::{self, Of, Sums};
+use crate::overlap::joint::miss_over;
 use nalgebra::Vector3;
 
 /// Impulses since the start (N s), and the bed's mass (kg).
@@ -85,135 +85,14 @@ impl Account {
             self.handed,
         ];
         let miss = now - self.grains_before - entries.iter().sum::<Vector3<f64>>();
-        over(miss, entries.into_iter().chain([now, self.grains_before]))
+        miss_over(miss, entries.iter().chain([&now, &self.grains_before]))
     }
 
     /// Error of what the relaxation gave to both sides, `owed` being what the continuum has still to take, over the
     /// largest entry.
     pub fn exchange_error(&self, owed: Vector3<f64>) -> f64 {
         let miss = self.relaxation + self.answer + owed + self.settled;
-        over(miss, [self.relaxation, self.weight].into_iter())
-    }
-}
-
-/// The largest part of a miss over the largest of all entries.
-fn over(miss: Vector3<f64>, entries: impl Iterator<Item = Vector3<f64>>) -> f64 {
-    let largest = entries.fold(0.0, |most: f64, entry| most.max(entry.amax()));
-    if largest > 0.0 {
-        miss.amax() / largest
-    } else {
-        miss.amax()
-    }
-}
-
-/// Sums over the exchanges for means in time.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Monitors {
-    /// Exchanges seen.
-    pub exchanges: f64,
-    /// Σ of the normal force of the contacts that cross the handshake surface, and of the continuum's stress (N).
-    pub force: [f64; 2],
-    /// Most grains beyond the box by more than a diameter.
-    pub escaped: f64,
-    /// Grains times their steps.
-    pub grain_steps: f64,
-    /// Steps of the continuum, and active cells in them.
-    pub steps: [f64; 2],
-    /// Newton iterations of the continuum.
-    pub iterations: f64,
-    /// Largest residual of the continuum's momentum.
-    pub residual: f64,
-    /// Σ of the granular temperature ⟨v′²⟩/3 of the buffer, of the inner overlap, and of as much of the grains beyond it
-    /// (m²/s²).
-    pub temperature: [f64; 3],
-    /// Work on the grains of the traction, of the impedance and of the relaxation (J), by velocities when they are laid;
-    /// negative where it takes energy from them.
-    pub work: [f64; 3],
-    /// Sizes of slip and relaxation.
-    pub(in crate::overlap) windows: Sums,
-}
-
-/// Numbers of the monitors without those of the windows, and with them.
-const OWN: usize = 15;
-/// See `OWN`.
-pub const MONITORED: usize = OWN + windows::NUMBERS;
-
-impl Monitors {
-    /// All of it in a row of numbers.
-    pub fn numbers(&self) -> [f64; MONITORED] {
-        let own: [f64; OWN] = [
-            self.exchanges,
-            self.force[0],
-            self.force[1],
-            self.escaped,
-            self.grain_steps,
-            self.steps[0],
-            self.steps[1],
-            self.iterations,
-            self.residual,
-            self.temperature[0],
-            self.temperature[1],
-            self.temperature[2],
-            self.work[0],
-            self.work[1],
-            self.work[2],
-        ];
-        let windows = self.windows.numbers();
-        std::array::from_fn(|k| match k.checked_sub(OWN) {
-            None => own[k],
-            Some(k) => windows[k],
-        })
-    }
-
-    /// From such numbers.
-    pub fn of(n: &[f64; MONITORED]) -> Self {
-        Self {
-            exchanges: n[0],
-            force: [n[1], n[2]],
-            escaped: n[3],
-            grain_steps: n[4],
-            steps: [n[5], n[6]],
-            iterations: n[7],
-            residual: n[8],
-            temperature: [n[9], n[10], n[11]],
-            work: [n[12], n[13], n[14]],
-            windows: Sums::from_numbers(&std::array::from_fn(|k| n[OWN + k])),
-        }
-    }
-
-    /// Size of the slip at the handshake surface, by means over windows in time ([`windows`]), mean over cells and windows (m/s).
-    pub fn mean_slip(&self) -> f64 {
-        self.windows.of(Of::Slip).mean()
-    }
-
-    /// What the noise of the grains' velocities alone would make it (m/s).
-    pub fn slip_noise(&self) -> f64 {
-        self.windows.of(Of::Slip).noise()
-    }
-
-    /// Largest mean of one window (m/s).
-    pub fn largest_slip(&self) -> f64 {
-        self.windows.of(Of::Slip).largest
-    }
-
-    /// Mean granular temperatures of the buffer, the inner overlap and the grains beyond it (m²/s²).
-    pub fn temperatures(&self) -> [f64; 3] {
-        self.temperature.map(|sum| sum / self.exchanges.max(1.0))
-    }
-
-    /// Normal force of the grains' contacts over that of the continuum's at the handshake surface.
-    pub fn force_ratio(&self) -> f64 {
-        self.force[0] / self.force[1]
-    }
-
-    /// Impulse of the relaxation, cell by cell, over that of the traction, face by face, by sizes of means over windows.
-    pub fn relaxation_share(&self) -> f64 {
-        self.windows.of(Of::Relaxation).size / self.windows.of(Of::Traction).size
-    }
-
-    /// What the noise of the grains' velocities alone would make it.
-    pub fn relaxation_noise(&self) -> f64 {
-        self.windows.of(Of::Relaxation).floor / self.windows.of(Of::Traction).size
+        miss_over(miss, [&self.relaxation, &self.weight])
     }
 }
 
@@ -222,11 +101,9 @@ mod tests {
     use super::*;
 
     #[test]
-    fn accounts_and_monitors_come_back_from_their_numbers() {
+    fn an_account_comes_back_from_its_numbers() {
         let numbers: [f64; NUMBERS] = std::array::from_fn(|k| k as f64 + 0.5);
         assert_eq!(Account::of(&numbers).numbers(), numbers);
-        let numbers: [f64; MONITORED] = std::array::from_fn(|k| k as f64 + 0.5);
-        assert_eq!(Monitors::of(&numbers).numbers(), numbers);
     }
 
     #[test]

@@ -8,8 +8,8 @@
 //! l from the centre of the grain that f acts on to that of its partner, h_c at the middle of it, V the volume of a
 //! cell.
 
-use crate::overlap::joint::vector_over as over;
-use colluvium_dem::{GrainSample, Partner, Snapshot};
+use crate::overlap::joint::{beside, lines, vector_over as over};
+use colluvium_dem::{GrainSample, Snapshot};
 use nalgebra::{Matrix3, Vector3};
 
 /// Cells of a bed in space, x fastest and z slowest (SI).
@@ -68,12 +68,8 @@ impl Cells {
     }
 
     /// Cells before and behind a place along an axis with their hats, from the first to the last that there are.
-    pub fn along(&self, axis: usize, at: f64, [first, last]: [usize; 2]) -> [(usize, f64); 2] {
-        let place = self.offset(axis, at) - 0.5;
-        let low = place.floor();
-        let share = place - low;
-        let index = |n: f64| (low + n).clamp(first as f64, last as f64) as usize;
-        [(index(0.0), 1.0 - share), (index(1.0), share)]
+    pub fn along(&self, axis: usize, at: f64, ends: [usize; 2]) -> [(usize, f64); 2] {
+        beside(self.offset(axis, at) - 0.5, ends)
     }
 
     /// The cells around a place with their hats; beyond the grid they are those at its edge.
@@ -93,18 +89,6 @@ pub struct Cover {
     pub mass: f64,
     /// Σ m v h (N s).
     pub momentum: Vector3<f64>,
-    /// Mass of the grains of the buffer (kg), and Σ m (u − v) h over them with the continuum's u at their places.
-    pub buffer: f64,
-    /// See `buffer` (N s).
-    pub buffer_slip: Vector3<f64>,
-    /// Σ I h over them, I = 2 m r²/5 (kg m²), and Σ I ω h (N m s).
-    pub turning: f64,
-    /// See `turning`.
-    pub spin: Vector3<f64>,
-    /// The same of the inner overlap.
-    pub inner: f64,
-    /// The same of the inner overlap (N s).
-    pub inner_slip: Vector3<f64>,
 }
 
 impl Cover {
@@ -151,8 +135,7 @@ impl Sums {
         }
     }
 
-    /// Takes the stresses of now into the averages with this weight. What does not belong to the bed is wall: its
-    /// half of the line between two centres is not material.
+    /// Takes the stresses of now into the averages with this weight; what does not belong to the bed is wall.
     pub fn press(
         &mut self,
         cells: &Cells,
@@ -167,26 +150,8 @@ impl Sums {
                 self.instant[cell] += hat * tensor;
             }
         };
-        for contact in &snapshot.contacts {
-            let grain = &snapshot.grains[contact.grain];
-            let other = match contact.partner {
-                Partner::Grain(j) => Some(&snapshot.grains[j]),
-                Partner::Wall(_) | Partner::Body(_) => None,
-            };
-            let (start, force, branch) = match (belongs(grain), other) {
-                (true, Some(other)) if belongs(other) => (
-                    &grain.position,
-                    contact.force,
-                    contact.arm - contact.partner_arm,
-                ),
-                (true, _) => (&grain.position, contact.force, contact.arm),
-                (false, Some(other)) if belongs(other) => {
-                    (&other.position, -contact.force, contact.partner_arm)
-                }
-                (false, _) => continue,
-            };
-            let tensor = per_volume * force * branch.transpose();
-            let middle = start + 0.5 * branch;
+        for [middle, force, line] in lines(snapshot, &belongs) {
+            let tensor = per_volume * force * line.transpose();
             add(cells.hats(&middle), 0.5 * (tensor + tensor.transpose()));
         }
         for grain in snapshot.grains.iter().filter(|grain| belongs(grain)) {

@@ -3,18 +3,14 @@
 use super::cells::Cells;
 use super::gradients::{gradient, shear_components};
 use crate::overlap::OverlapError;
+use crate::overlap::joint::{self, FULL, surface_factor};
 use crate::overlap::rest_stress::RestStress;
-use colluvium_continuum::free_surface::{SpaceFlow, SpaceState, SurfaceOptions};
+use colluvium_continuum::free_surface::{SpaceFlow, SurfaceOptions};
 use colluvium_continuum::grid::{Axis, Boundary, Grid};
 use colluvium_continuum::rheology::{MuI, Rheology};
 use colluvium_continuum::strain::deviator;
 use colluvium_continuum::units::Units;
 use nalgebra::{Matrix3, Vector3};
-
-/// Cells fuller than this have a pressure of their own.
-const FULL: f64 = 0.5;
-/// Most by which the pressure of a cell at the surface is taken to be below the mean over its filled part.
-const LARGEST_FACTOR: f64 = 2.0;
 
 /// A bed at rest that fills these fractions, over a rough floor and between smooth walls, in natural units.
 ///
@@ -89,11 +85,7 @@ impl View {
             let is_full = |cell: usize| state.fractions[cell] > FULL;
             let factor = match cells.above(cell) {
                 Some(above) if is_full(above) => 1.0,
-                // Linear from the centre to the surface, over the filled part.
-                _ if is_full(cell) => {
-                    let f = fraction.min(1.0);
-                    (f / (2.0 * f - 1.0)).min(LARGEST_FACTOR)
-                }
+                _ if is_full(cell) => surface_factor(fraction.min(1.0)),
                 _ => 0.0,
             };
             let p = factor * state.pressure[cell].max(0.0);
@@ -121,12 +113,7 @@ impl View {
 
     /// Velocity at a place from the full cells around it; none without any.
     pub fn velocity_at(&self, hats: &[(usize, f64); 8]) -> Option<Vector3<f64>> {
-        let (mut sum, mut weight) = (Vector3::zeros(), 0.0);
-        for &(cell, hat) in hats.iter().filter(|(cell, _)| self.is_full(*cell)) {
-            weight += hat;
-            sum += hat * self.velocity[cell];
-        }
-        (weight > 0.0).then(|| sum / weight)
+        joint::velocity_at(hats, |cell| self.is_full(cell), &self.velocity)
     }
 
     /// Filled part, stress (Pa) and velocity between two cells, from those that are full; none where neither is.
@@ -158,44 +145,6 @@ pub fn components(stress: &Matrix3<f64>) -> ([f64; 5], f64) {
         s(1, 2),
     ];
     (deviatoric, -stress.trace() / 3.0)
-}
-
-/// The state of a flow as numbers, each row with its length before it.
-pub fn write(state: &SpaceState, put: &mut impl FnMut(&[f64])) {
-    put(&state.fractions);
-    for velocity in &state.velocity {
-        put(velocity);
-    }
-    put(&state.pressure);
-    put(state.stress.as_flattened());
-    put(&[
-        state.time,
-        state.velocity_time,
-        state.next_step,
-        state.steps as f64,
-    ]);
-}
-
-/// Reads it back.
-pub fn read<'a>(take: &mut impl FnMut() -> Option<&'a [f64]>) -> Option<SpaceState> {
-    let fractions = take()?.to_vec();
-    let velocity = [take()?.to_vec(), take()?.to_vec(), take()?.to_vec()];
-    let pressure = take()?.to_vec();
-    let stress = take()?.as_chunks::<5>().0.to_vec();
-    let &[time, velocity_time, next_step, steps] = take()? else {
-        return None;
-    };
-    Some(SpaceState {
-        fractions,
-        velocity,
-        pressure,
-        stress,
-        time,
-        velocity_time,
-        next_step,
-        steps: steps as usize,
-        ..SpaceState::default()
-    })
 }
 
 #[cfg(test)]

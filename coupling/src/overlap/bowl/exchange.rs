@@ -4,28 +4,17 @@ use super::continuum::{components, sideways};
 use super::gradients::{gradient, rotation};
 use super::{Bowl, OverlapError};
 use crate::overlap::angular::{AngularBook, Counterpart, Parts};
-use crate::overlap::joint::{self, LEAST_BUFFER, inertia, towards, vector_over as over};
+use crate::overlap::cell_joint::Shell;
+use crate::overlap::joint::{self, inertia};
+use crate::overlap::slips::{Met, compare};
 use colluvium_dem::{GrainSample, Load, Simulation};
 use nalgebra::Vector3;
-
-/// The shell's weight at a face of the box, and its slip.
-#[derive(Clone, Copy, Debug, Default)]
-pub(super) struct Shell {
-    /// Σ q h (kg).
-    pub weight: f64,
-    /// Σ q h (v − u), u the continuum's velocity at the grain (N s).
-    pub slip: Vector3<f64>,
-    /// Σ q h v (N s).
-    momentum: Vector3<f64>,
-    /// What presses on it and on those above it without grains (N).
-    force: Vector3<f64>,
-}
 
 /// Room for what is formed and forgotten in a step.
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     near: Vec<GrainSample>,
-    pub(super) shell: Vec<Shell>,
+    pub(super) shell: Vec<Shell<3>>,
     loads: Vec<Load>,
 }
 
@@ -37,11 +26,11 @@ impl Bowl {
     /// If the continuum's step fails or the grains refuse a load.
     pub fn go_on(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
         self.book_grains(simulation);
-        self.made += 1;
-        if self.made == self.loads_of_exchange {
+        self.joint.made += 1;
+        if self.joint.made == self.joint.loads_of_exchange {
             self.exchange(simulation)?;
-            self.made = 0;
-            self.exchanges += 1;
+            self.joint.made = 0;
+            self.joint.exchanges += 1;
             let before = self
                 .angular
                 .is_some()
@@ -56,22 +45,9 @@ impl Bowl {
 
     /// Books the impulses of what was laid over the steps made since.
     pub(super) fn book_grains(&mut self, simulation: &Simulation) {
-        self.monitors.grain_steps += simulation.grain_count() as f64 * self.steps_of_loads as f64;
-        let time = self.acting(simulation);
-        for (work, power) in self.monitors.work.iter_mut().zip(self.laid.powers) {
-            *work += power * time;
-        }
-        for (sum, force) in self.given.relaxation.iter_mut().zip(&self.laid.relaxation) {
-            *sum += force * time;
-        }
-        for (sum, moment) in self.given.spin.iter_mut().zip(&self.laid.spin) {
-            *sum += moment * time;
-        }
-        self.given.traction += self.laid.traction * time;
-        self.given.impedance += self.laid.impedance * time;
-        let relaxation: Vector3<f64> = self.laid.relaxation.iter().sum();
-        self.account.relaxation += relaxation * time;
-        self.account.weight += simulation.gravity() * self.grain_mass * time;
+        self.grain_steps += simulation.grain_count() as f64 * self.joint.steps_of_loads as f64;
+        self.account.relaxation += self.joint.book(simulation);
+        self.account.weight += self.weight_until_now(simulation);
     }
 
     /// q of a grain for a side: its mass, less the farther it lies inside, down to none at the shell's end.
@@ -102,8 +78,7 @@ impl Bowl {
 
     /// Lays the loads of the next steps.
     pub(super) fn lay(&mut self, simulation: &mut Simulation) -> Result<(), OverlapError> {
-        self.laid_at = simulation.steps_done();
-        self.laid.clear();
+        self.joint.lay_anew(simulation);
         let mut angular = self.angular.take();
         let laid = self.lay_noting(simulation, angular.as_mut());
         self.angular = angular;
@@ -147,10 +122,10 @@ impl Bowl {
             let inertia = inertia(grain);
             let mut moment = Vector3::zeros();
             for (cell, hat) in cells.hats(&grain.position) {
-                let pull = grain.mass * hat * self.held.accelerations[cell];
-                let turn = inertia * hat * self.held.spins[cell];
-                self.laid.relaxation[cell] += pull;
-                self.laid.spin[cell] += turn;
+                let pull = grain.mass * hat * self.joint.accelerations[cell];
+                let turn = inertia * hat * self.joint.spins[cell];
+                self.joint.laid.relaxation[cell] += pull;
+                self.joint.laid.spin[cell] += turn;
                 force += pull;
                 moment += turn;
             }
@@ -171,9 +146,9 @@ impl Bowl {
                 }
             }
         }
-        self.laid.powers[2] = power;
+        self.joint.laid.powers[2] = power;
         if let Some(book) = angular {
-            for (cell, force) in self.laid.relaxation.iter().enumerate() {
+            for (cell, force) in self.joint.laid.relaxation.iter().enumerate() {
                 answer.add(1, &cells.centre(cell), force);
             }
             book.answered_by(&answer);
@@ -186,23 +161,20 @@ impl Bowl {
     /// Weights and slips of the shell, face by face.
     fn weigh(&self, scratch: &mut Scratch) {
         scratch.shell.clear();
-        scratch.shell.resize(self.faces.all.len(), Shell::default());
+        scratch.shell.resize(self.faces.all.len(), Shell::NONE);
         for grain in &scratch.near {
             let hats = self.layout.cells.hats(&grain.position);
             let beside = self.view.velocity_at(&hats);
             for (face, part) in self.shares(grain) {
-                let shell = &mut scratch.shell[face];
-                shell.weight += part;
                 let u = beside.unwrap_or(self.held.velocity[face]);
-                shell.slip += part * (grain.velocity - u);
-                shell.momentum += part * grain.velocity;
+                scratch.shell[face].add(part, grain.velocity, u);
             }
         }
     }
 
     /// What presses on each face, on the grains that bear it: its own, or those of the next face below with grains. Says where
     /// the continuum has it.
-    fn press_on_shell(&mut self, shells: &mut [Shell]) -> Counterpart {
+    fn press_on_shell(&mut self, shells: &mut [Shell<3>]) -> Counterpart {
         let mut answer = Counterpart::default();
         let impedance = self.spec.settings.impedance;
         for number in 0..self.faces.all.len() {
@@ -212,16 +184,16 @@ impl Bowl {
                 bearer = self.faces.all[face].below;
             }
             let Some(bearer) = bearer else { continue };
-            let slip = over(shells[bearer].slip, shells[bearer].weight);
+            let slip = shells[bearer].slip();
             let axis = self.layout.zone.sides[side].axis;
             let mut resistance = Vector3::zeros();
             resistance[axis] = -impedance * self.held.area[number] * slip[axis];
             shells[bearer].force += self.held.traction[number] + resistance;
-            self.laid.traction += self.held.traction[number];
-            self.laid.impedance += resistance;
-            let velocity = over(shells[bearer].momentum, shells[bearer].weight);
-            self.laid.powers[0] += self.held.traction[number].dot(&velocity);
-            self.laid.powers[1] += resistance.dot(&velocity);
+            self.joint.laid.traction += self.held.traction[number];
+            self.joint.laid.impedance += resistance;
+            let velocity = shells[bearer].velocity();
+            self.joint.laid.powers[0] += self.held.traction[number].dot(&velocity);
+            self.joint.laid.powers[1] += resistance.dot(&velocity);
             let beside = self.faces.all[number].cells;
             let [out, inside] = beside.map(|cell| self.layout.cells.centre(cell));
             answer.add(
@@ -242,7 +214,7 @@ impl Bowl {
     /// K the couple's impulse (N m s), h_a spacing along axis a (m). At the ends of the grid there is nothing to take them.
     pub(super) fn answer_couples(&mut self) {
         let cells = &self.layout.cells;
-        for (cell, given) in self.given.spin.iter().enumerate() {
+        for (cell, given) in self.joint.given.spin.iter().enumerate() {
             let index = cells.index(cell);
             let is_inside = (0..3).all(|a| index[a] > 0 && index[a] + 1 < cells.counts[a]);
             if *given == Vector3::zeros() || !is_inside {
@@ -253,8 +225,8 @@ impl Bowl {
                 let force = -given.cross(&arm);
                 let (mut low, mut high) = (index, index);
                 (low[axis], high[axis]) = (index[axis] - 1, index[axis] + 1);
-                self.owed[cells.cell(high)] += force;
-                self.owed[cells.cell(low)] -= force;
+                self.joint.owed[cells.cell(high)] += force;
+                self.joint.owed[cells.cell(low)] -= force;
             }
         }
     }
@@ -264,19 +236,17 @@ impl Bowl {
         let dt = self.exchange_time();
         self.sighting.look(simulation);
         self.sum_up(-(-dt / self.spec.settings.stress_time).exp_m1());
-        for (owed, given) in self.owed.iter_mut().zip(&self.given.relaxation) {
-            *owed -= given;
-        }
+        self.joint.owe();
         self.answer_couples();
         self.bear();
         self.watch_impulses();
-        self.account.traction += self.given.traction;
-        self.account.impedance += self.given.impedance;
-        self.given.clear();
+        self.account.traction += self.joint.given.traction;
+        self.account.impedance += self.joint.given.impedance;
+        self.joint.given.clear();
         if !self.spec.settings.uncoupled {
             self.copy_the_grains(dt)?;
         }
-        self.step_continuum(dt, self.exchanges + 1)?;
+        self.step_continuum(dt, self.joint.exchanges + 1)?;
         self.agree();
         self.watch(dt);
         Ok(())
@@ -315,7 +285,7 @@ impl Bowl {
             outside.stress[cell] = deviatoric.map(|s| s * stress);
             outside.cover[cell] = joint::cover(part);
             outside.share[cell] = joint::share(part, label, zones);
-            outside.force[cell] = (self.owed[cell] * (force / dt)).into();
+            outside.force[cell] = (self.joint.owed[cell] * (force / dt)).into();
         }
     }
 
@@ -331,21 +301,14 @@ impl Bowl {
         let before = self.flow.state().velocity_time;
         while self.flow.state().time < until * (1.0 - 1e-12) {
             let step = self.flow.step(until - self.flow.state().time)?;
-            self.monitors.steps[0] += 1.0;
-            self.monitors.steps[1] += step.active_cells as f64;
-            self.monitors.iterations += step.newton_iterations as f64;
-            self.monitors.residual = self.monitors.residual.max(step.residuals.momentum);
+            self.joint.monitors.take_step(&step);
         }
         // Velocities have moved on by this, half a step ahead of the fractions.
         let pushed = (self.flow.state().velocity_time - before) * unit;
         let untaken = Vector3::from(self.flow.take_untaken());
         self.account.untaken += untaken * self.impulse_unit();
         if coupled {
-            for owed in &mut self.owed {
-                let answer = *owed * (pushed / dt);
-                *owed -= answer;
-                self.account.answer += answer;
-            }
+            self.joint.answer(pushed / dt, &mut self.account.answer);
         }
         self.view
             .look(&self.flow, &self.layout.cells, &self.units, dt);
@@ -357,76 +320,51 @@ impl Bowl {
         self.view
             .look(&self.flow, &self.layout.cells, &self.units, 0.0);
         let before = self.flow.state().clone();
-        let (account, monitors) = (self.account, self.monitors);
+        let (account, monitors) = (self.account, self.joint.monitors);
         let rest = self.view.rest.clone();
         self.step_continuum(self.exchange_time(), 1)?;
         self.flow.set_state(before)?;
         self.view.rest = rest;
-        (self.account, self.monitors) = (account, monitors);
+        (self.account, self.joint.monitors) = (account, monitors);
         Ok(())
     }
 
-    /// Slips between both sides, with the same hats at the grains' own places.
-    fn slips(&mut self) {
+    /// Grains of the bed with their labels (cells).
+    pub(super) fn labelled(&self) -> impl Iterator<Item = (&GrainSample, f64)> {
+        let (cells, zone, belongs) = (&self.layout.cells, &self.layout.zone, self.spec.belongs());
+        let bed = self.sighting.snapshot.grains.iter();
+        let bed = bed.filter(move |grain| belongs(grain));
+        bed.map(|grain| (grain, zone.label(cells, &grain.position)))
+    }
+
+    /// Those of the overlap that lie in the continuum.
+    pub(super) fn met(&self) -> impl Iterator<Item = Met<'_, 3, 8>> {
         let [handshake, inner] = self.layout.widths;
-        for cover in &mut self.sums.cover {
-            (cover.buffer, cover.buffer_slip) = (0.0, Vector3::zeros());
-            (cover.turning, cover.spin) = (0.0, Vector3::zeros());
-            (cover.inner, cover.inner_slip) = (0.0, Vector3::zeros());
-        }
-        let belongs = self.spec.belongs();
-        let (cells, zone) = (&self.layout.cells, &self.layout.zone);
-        for grain in self.sighting.snapshot.grains.iter().filter(|g| belongs(g)) {
-            let label = zone.label(cells, &grain.position);
-            if label >= inner {
-                continue;
-            }
-            let hats = cells.hats(&grain.position);
-            let Some(u) = self.view.velocity_at(&hats) else {
-                continue;
-            };
-            let slip = u - grain.velocity;
-            for (cell, hat) in hats {
-                let cover = &mut self.sums.cover[cell];
-                let mass = grain.mass * hat;
-                let (sum, slips) = match label < handshake {
-                    true => (&mut cover.buffer, &mut cover.buffer_slip),
-                    false => (&mut cover.inner, &mut cover.inner_slip),
-                };
-                *sum += mass;
-                *slips += mass * slip;
-                if label < handshake {
-                    let turning = inertia(grain) * hat;
-                    cover.turning += turning;
-                    cover.spin += turning * grain.spin;
-                }
-            }
-        }
+        let overlap = self.labelled().filter(move |(_, label)| *label < inner);
+        overlap.filter_map(move |(grain, label)| {
+            let hats = self.layout.cells.hats(&grain.position);
+            Some(Met {
+                grain,
+                is_buffer: label < handshake,
+                hats,
+                velocity: self.view.velocity_at(&hats)?,
+            })
+        })
     }
 
     /// Takes the continuum's traction, and forms the accelerations that bring mean velocities together, and mean spins
     /// to half of the curl.
     pub(super) fn agree(&mut self) {
-        self.slips();
-        let dt = self.exchange_time();
-        let rate = towards(dt, self.spec.settings.relaxation_time);
-        let turn = towards(dt, self.spec.settings.spin_time);
-        let full = self.full();
-        for cell in 0..self.layout.cells.count() {
-            let cover = &self.sums.cover[cell];
-            let holds = self.view.is_full(cell) && cover.buffer > LEAST_BUFFER * full;
-            self.held.accelerations[cell] = match holds {
-                true => rate * cover.buffer_slip / cover.buffer,
-                false => Vector3::zeros(),
-            };
-            self.held.spins[cell] = match holds {
-                true => {
-                    let material = rotation(&gradient(&self.view, &self.layout.cells, cell));
-                    turn * (material - over(cover.spin, cover.turning))
-                }
-                false => Vector3::zeros(),
-            };
-        }
+        let mut slips = std::mem::take(&mut self.joint.slips);
+        compare(self.met(), &mut slips);
+        self.joint.slips = slips;
+        let (full, view) = (self.full(), &self.view);
+        self.joint.relax(
+            &self.spec.settings,
+            full,
+            |cell| view.is_full(cell),
+            |cell| rotation(&gradient(view, &self.layout.cells, cell)),
+        );
         let (cells, zone) = (&self.layout.cells, &self.layout.zone);
         for (number, face) in self.faces.all.iter().enumerate() {
             let side = &zone.sides[face.side];

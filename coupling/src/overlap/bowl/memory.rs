@@ -3,51 +3,31 @@
 //! In front stands what every load changes, of a length that does not; behind it what an exchange changes, in rows
 //! with their lengths before them.
 
-use super::account::{self, Account, Monitors};
+use super::account::{self, Account};
 use super::cells::Cells;
 use super::journey::Journey;
 use super::zone::Zone;
-use super::{Bowl, BowlSpec, Layout, OverlapError, continuum};
+use super::{Bowl, BowlSpec, Layout, OverlapError};
+use crate::overlap::cell_joint::CellJoint;
+use crate::overlap::cell_memory;
+use crate::overlap::joint::{flat, vectors};
 use crate::overlap::sighting::free_mass;
+use crate::overlap::state_rows;
 use colluvium_continuum::free_surface::SpaceState;
 use colluvium_dem::Simulation;
 use nalgebra::{Matrix3, Vector3};
 
-/// Numbers in front but for the four rows of forces and moments by cell, the account among them.
-const FRONT: usize = 4 + 12 + 6 + account::NUMBERS;
-
-/// Vectors one behind the other.
-fn flat(rows: &[Vector3<f64>]) -> impl Iterator<Item = f64> {
-    rows.iter().flat_map(|row| [row.x, row.y, row.z])
-}
-
-fn vectors(numbers: &[f64]) -> Vec<Vector3<f64>> {
-    let rows = numbers.as_chunks::<3>().0;
-    rows.iter().map(|row| Vector3::from(*row)).collect()
-}
+/// What a memory that does not fit is told.
+const MISSING: &str = "the bowl's memory misses a part";
+/// Numbers in front that are not the joint's: steps of grains, and the account.
+const MORE: usize = 1 + account::NUMBERS;
 
 impl Bowl {
     /// What every load changes.
     fn front(&self) -> Vec<f64> {
-        let cells = self.layout.cells.count();
-        let mut front = Vec::with_capacity(FRONT + 12 * cells);
-        front.extend([
-            cells as f64,
-            self.made as f64,
-            self.laid_at as f64,
-            self.monitors.grain_steps,
-        ]);
-        for given in [&self.laid, &self.given] {
-            front.extend(flat(&[given.traction, given.impedance]));
-        }
-        front.extend(self.monitors.work);
-        front.extend(self.laid.powers);
-        front.extend(self.account.numbers());
-        for given in [&self.laid, &self.given] {
-            front.extend(flat(&given.relaxation));
-            front.extend(flat(&given.spin));
-        }
-        front
+        let mut more = [self.grain_steps; MORE];
+        more[1..].copy_from_slice(&self.account.numbers());
+        self.joint.front(&more)
     }
 
     /// Writes what has changed since an exchange over what [`write`](Self::write) wrote after it.
@@ -63,9 +43,8 @@ impl Bowl {
             memory.push(row.len() as f64);
             memory.extend(row);
         };
-        put(&[self.exchanges as f64, self.layout.height]);
-        put(&self.monitors.numbers());
-        put(&self.windows.numbers());
+        put(&[self.layout.height]);
+        self.joint.write(&mut put);
         put(&self.columns);
         put(&self.moved);
         put(&[self.view.rest.ratio]);
@@ -76,13 +55,7 @@ impl Bowl {
             .iter()
             .flat_map(|s| [(0, 0), (1, 1), (2, 2), (0, 1), (0, 2), (1, 2)].map(|at| s[at]));
         put(&stress.collect::<Vec<f64>>());
-        for row in [
-            &self.held.accelerations,
-            &self.held.spins,
-            &self.held.traction,
-            &self.held.velocity,
-            &self.owed,
-        ] {
+        for row in [&self.held.traction, &self.held.velocity] {
             put(&flat(row).collect::<Vec<f64>>());
         }
         put(&self.held.area);
@@ -90,7 +63,7 @@ impl Bowl {
         put(&self.layout.zone.corners());
         put(&[self.start_volume]);
         put(self.unborne.as_slice());
-        continuum::write(self.flow.state(), &mut put);
+        state_rows::write(self.flow.state(), &mut put);
     }
 
     /// Goes on from what was written of a bowl with the same specification; the simulation is the one that was
@@ -103,7 +76,7 @@ impl Bowl {
         memory: &[f64],
         simulation: &Simulation,
     ) -> Result<Self, OverlapError> {
-        let missing = || OverlapError::Record("the bowl's memory misses a part".into());
+        let missing = || OverlapError::Record(MISSING.into());
         let rows = Rows::of(memory).ok_or_else(missing)?;
         let mut bowl = Self::around(spec, spec.layout(rows.height)?, simulation)?;
         let zone = rows.zone(&bowl.layout.cells).ok_or_else(missing)?;
@@ -138,23 +111,16 @@ impl Layout {
 
 /// What was written, by name.
 struct Rows<'a> {
-    cells: usize,
-    /// Scalars in front, and forces by cell.
-    front: [&'a [f64]; 2],
-    exchanges: f64,
+    front: &'a [f64],
     height: f64,
-    monitors: [f64; account::MONITORED],
-    window: &'a [f64],
+    joint: cell_memory::Rows<'a>,
     columns: &'a [f64],
     moved: &'a [f64],
     ratio: f64,
     strain: &'a [f64],
     stress: &'a [f64],
-    accelerations: &'a [f64],
-    spins: &'a [f64],
     traction: &'a [f64],
     velocity: &'a [f64],
-    owed: &'a [f64],
     area: &'a [f64],
     journey: Journey,
     corners: [f64; 5],
@@ -166,41 +132,34 @@ struct Rows<'a> {
 impl<'a> Rows<'a> {
     /// Of a memory; nothing if a row is missing or too short.
     fn of(memory: &'a [f64]) -> Option<Self> {
-        let cells = *memory.first()? as usize;
-        let (front, mut rest) = memory.split_at_checked(FRONT + 12 * cells)?;
+        let (front, mut rest) = CellJoint::<3, 3>::split(memory, MORE)?;
         let mut take = || {
             let (length, after) = rest.split_first()?;
             let (row, after) = after.split_at_checked(*length as usize)?;
             rest = after;
             Some(row)
         };
-        let &[exchanges, height] = take()? else {
+        let &[height] = take()? else {
             return None;
         };
         // In the order of `write`.
         Some(Self {
-            cells,
-            front: front.split_at(FRONT).into(),
-            exchanges,
+            front,
             height,
-            monitors: take()?.try_into().ok()?,
-            window: take()?,
+            joint: CellJoint::<3, 3>::rows(&mut take)?,
             columns: take()?,
             moved: take()?,
             ratio: *take()?.first()?,
             strain: take()?,
             stress: take()?,
-            accelerations: take()?,
-            spins: take()?,
             traction: take()?,
             velocity: take()?,
-            owed: take()?,
             area: take()?,
             journey: Journey::read(&mut take)?,
             corners: take()?.try_into().ok()?,
             start_volume: *take()?.first()?,
             unborne: *vectors(take()?).first()?,
-            state: continuum::read(&mut take)?,
+            state: state_rows::read(&mut take)?,
         })
     }
 
@@ -217,13 +176,9 @@ impl<'a> Rows<'a> {
     fn fit(&self, bowl: &Bowl) -> bool {
         let grid = &bowl.layout.cells;
         let (cells, faces) = (grid.count(), bowl.faces.all.len());
-        self.cells == cells
-            && self.columns.len() == grid.counts[0] * grid.counts[1]
+        self.columns.len() == grid.counts[0] * grid.counts[1]
             && self.strain.len() == 5 * cells
             && self.stress.len() == 6 * cells
-            && self.accelerations.len() == 3 * cells
-            && self.spins.len() == 3 * cells
-            && self.owed.len() == 3 * cells
             && self.traction.len() == 3 * faces
             && self.velocity.len() == 3 * faces
             && [self.moved, self.area].map(<[f64]>::len) == [faces; 2]
@@ -231,7 +186,11 @@ impl<'a> Rows<'a> {
 
     /// Makes the bowl what it was.
     fn fill(self, bowl: &mut Bowl) -> Result<(), OverlapError> {
-        let [scalars, forces] = self.front;
+        let missing = || OverlapError::Record(MISSING.into());
+        let more = bowl.joint.fill(self.front, MORE, self.joint);
+        let (steps, account) = more.and_then(<[f64]>::split_first).ok_or_else(missing)?;
+        bowl.grain_steps = *steps;
+        bowl.account = Account::of(account.try_into().map_err(|_| missing())?);
         bowl.journey = self.journey;
         bowl.start_volume = self.start_volume;
         bowl.unborne = self.unborne;
@@ -243,31 +202,9 @@ impl<'a> Rows<'a> {
         bowl.sums.stress = stresses
             .map(|&[xx, yy, zz, xy, xz, yz]| Matrix3::new(xx, xy, xz, xy, yy, yz, xz, yz, zz))
             .collect();
-        bowl.held.accelerations = vectors(self.accelerations);
-        bowl.held.spins = vectors(self.spins);
         bowl.held.traction = vectors(self.traction);
         bowl.held.velocity = vectors(self.velocity);
         bowl.held.area = self.area.to_vec();
-        bowl.owed = vectors(self.owed);
-        bowl.monitors = Monitors::of(&self.monitors);
-        let unfit = || OverlapError::Record("the bowl's window of monitors does not fit".into());
-        bowl.windows.take_up(self.window).ok_or_else(unfit)?;
-        bowl.monitors.grain_steps = scalars[3];
-        bowl.monitors.work = [scalars[16], scalars[17], scalars[18]];
-        bowl.laid.powers = [scalars[19], scalars[20], scalars[21]];
-        bowl.exchanges = self.exchanges as u64;
-        bowl.made = scalars[1] as u64;
-        bowl.laid_at = scalars[2] as u64;
-        for (k, given) in [&mut bowl.laid, &mut bowl.given].into_iter().enumerate() {
-            let pair = vectors(&scalars[4 + 6 * k..10 + 6 * k]);
-            (given.traction, given.impedance) = (pair[0], pair[1]);
-            let row = |n: usize| &forces[3 * self.cells * n..3 * self.cells * (n + 1)];
-            given.relaxation = vectors(row(2 * k));
-            given.spin = vectors(row(2 * k + 1));
-        }
-        let mut account = [0.0; account::NUMBERS];
-        account.copy_from_slice(&scalars[22..]);
-        bowl.account = Account::of(&account);
         bowl.flow.set_state(self.state)?;
         Ok(())
     }

@@ -36,18 +36,18 @@ mod store;
 mod watch;
 mod zone;
 
-pub use account::{Account, Monitors};
+pub use super::cell_monitors::CellMonitors as Monitors;
+pub use account::Account;
 pub use cells::Cells;
 pub use journey::{Growth, Move};
 pub use zone::Zone;
 
 use super::OverlapError;
 use super::angular::AngularBook;
-use super::joint;
+use super::cell_joint::CellJoint;
 use super::rest_stress::RestStress;
 use super::settings::{Resolved, check};
 use super::sighting::{Sighting, free_mass};
-use super::windows::Windows;
 use cells::Sums;
 use colluvium_continuum::free_surface::{Outside, SpaceFields, SpaceFlow, SurfaceOptions};
 use colluvium_continuum::rheology::MuI;
@@ -224,44 +224,11 @@ impl BowlSpec {
 /// What acts on the grains until the next exchange.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Held {
-    /// Accelerations of mean velocities of the buffer, cell by cell (m/s²).
-    accelerations: Vec<Vector3<f64>>,
-    /// Angular accelerations of their mean spins (rad/s²).
-    spins: Vec<Vector3<f64>>,
     /// Force of the continuum on each face of the box (N), the area it acts on (m²), and the continuum's velocity
     /// there (m/s).
     traction: Vec<Vector3<f64>>,
     area: Vec<f64>,
     velocity: Vec<Vector3<f64>>,
-}
-
-/// Sums of forces that are laid (N), or of their impulses since the last exchange (N s).
-#[derive(Clone, Debug, Default, PartialEq)]
-struct Given {
-    relaxation: Vec<Vector3<f64>>,
-    /// Moments of the relaxation of spins, by cell (N m, or N m s).
-    spin: Vec<Vector3<f64>>,
-    traction: Vector3<f64>,
-    impedance: Vector3<f64>,
-    /// Powers of traction, impedance and relaxation when they were laid (W); of what is laid alone.
-    powers: [f64; 3],
-}
-
-impl Given {
-    fn nothing(cells: usize) -> Self {
-        Self {
-            relaxation: vec![Vector3::zeros(); cells],
-            spin: vec![Vector3::zeros(); cells],
-            ..Self::default()
-        }
-    }
-
-    fn clear(&mut self) {
-        self.relaxation.fill(Vector3::zeros());
-        self.spin.fill(Vector3::zeros());
-        (self.traction, self.impedance) = (Vector3::zeros(), Vector3::zeros());
-        self.powers = [0.0; 3];
-    }
 }
 
 /// Grains in a bowl and the continuum around them. The grains are the caller's: every call needs the same simulation.
@@ -284,12 +251,7 @@ pub struct Bowl {
     sums: Sums,
     view: View,
     held: Held,
-    laid: Given,
-    given: Given,
-    /// Steps that the grains had made when this was laid.
-    laid_at: u64,
-    /// Impulse that the continuum has still to take from the relaxation (N s).
-    owed: Vec<Vector3<f64>>,
+    joint: CellJoint<3, 3>,
     /// Momentum of moves of the box that no cell was there to give back yet (N s).
     unborne: Vector3<f64>,
     /// How far grains have moved outwards through each face of the box (m).
@@ -300,15 +262,7 @@ pub struct Bowl {
     /// L of all cells after the last exchange (1/s), of a box that grows.
     gradients: Vec<Matrix3<f64>>,
     account: Account,
-    monitors: Monitors,
-    /// The window of slip and relaxation that is open.
-    windows: Windows,
-    /// Steps for which loads are held, how often until an exchange, and how often since the last one.
-    steps_of_loads: u64,
-    loads_of_exchange: u64,
-    made: u64,
-    exchanges: u64,
-    timestep: f64,
+    grain_steps: f64,
     sighting: Sighting,
     scratch: exchange::Scratch,
     outside: Outside<3, 5>,
@@ -375,8 +329,6 @@ impl Bowl {
             f64::from(u8::from(is_bed))
         });
         let flow = continuum::bed(cells, fractions.collect(), &spec.law, &units, &spec.options)?;
-        let steps_of_loads = spec.settings.steps_of_loads(simulation.timestep());
-        let loads_of_exchange = spec.settings.loads_of_exchange(simulation.timestep());
         let count = cells.count();
         let zone = zone.clone();
         let mut bowl = Self {
@@ -390,28 +342,15 @@ impl Bowl {
                 rest: RestStress::nothing(layout.cells.count(), spec.settings.rest_strain),
                 ..View::default()
             },
-            held: Held {
-                accelerations: vec![Vector3::zeros(); count],
-                spins: vec![Vector3::zeros(); count],
-                ..Held::default()
-            },
-            laid: Given::nothing(count),
-            given: Given::nothing(count),
-            laid_at: simulation.steps_done(),
-            owed: vec![Vector3::zeros(); count],
+            held: Held::default(),
+            joint: CellJoint::new(count, count, &spec.settings, simulation),
             unborne: Vector3::zeros(),
             moved: Vec::new(),
             journey: Journey::default(),
             packings: Vec::new(),
             gradients: vec![Matrix3::zeros(); count],
             account: Account::default(),
-            monitors: Monitors::default(),
-            windows: Windows::new(3, [count; 2], &spec.settings),
-            steps_of_loads,
-            loads_of_exchange,
-            made: 0,
-            exchanges: 0,
-            timestep: simulation.timestep(),
+            grain_steps: 0.0,
             sighting: Sighting::default(),
             scratch: exchange::Scratch::default(),
             outside: Outside::nothing(count),
@@ -493,12 +432,11 @@ impl Bowl {
     /// Accounts since the start, with what the grains have been given since the last exchange.
     pub fn account(&self, simulation: &Simulation) -> Account {
         let mut account = self.account;
-        let time = self.acting(simulation);
-        let relaxation: Vector3<f64> = self.laid.relaxation.iter().sum();
-        account.traction += self.given.traction + self.laid.traction * time;
-        account.impedance += self.given.impedance + self.laid.impedance * time;
-        account.relaxation += relaxation * time;
-        account.weight += simulation.gravity() * self.grain_mass * time;
+        let [traction, impedance, relaxation] = self.joint.unbooked(simulation);
+        account.traction += traction;
+        account.impedance += impedance;
+        account.relaxation += relaxation;
+        account.weight += self.weight_until_now(simulation);
         account
     }
 
@@ -525,9 +463,9 @@ impl Bowl {
         self.angular.as_ref()
     }
 
-    /// For how long what is laid has acted and is not booked yet (s).
-    fn acting(&self, simulation: &Simulation) -> f64 {
-        joint::acting(simulation, self.laid_at)
+    /// Impulse of the grains' weight that is not booked yet (N s).
+    fn weight_until_now(&self, simulation: &Simulation) -> Vector3<f64> {
+        simulation.gravity() * self.grain_mass * self.joint.acting(simulation)
     }
 
     /// K_0 of the bed when it was cut.
@@ -537,19 +475,17 @@ impl Bowl {
 
     /// Momentum that the continuum has still to take from the relaxation (N s).
     pub fn owed(&self, simulation: &Simulation) -> Vector3<f64> {
-        let time = self.acting(simulation);
-        let forces = self.laid.relaxation.iter().zip(&self.given.relaxation);
-        let all = self.owed.iter().zip(forces);
-        let owed = all.map(|(owed, (laid, given))| owed - given - laid * time);
-        owed.sum::<Vector3<f64>>() - self.unborne
+        self.joint.owed(simulation) - self.unborne
     }
 
     /// What the monitors have seen, with the window that is open.
     pub fn monitors(&self) -> Monitors {
-        Monitors {
-            windows: self.windows.closed(&self.monitors.windows),
-            ..self.monitors
-        }
+        self.joint.seen()
+    }
+
+    /// Grains times their steps.
+    pub fn grain_steps(&self) -> f64 {
+        self.grain_steps
     }
 
     /// Farthest that grains have moved through a face of the box in the mean, outwards positive (m).
@@ -580,17 +516,17 @@ impl Bowl {
 
     /// Time between two exchanges (s).
     pub fn exchange_time(&self) -> f64 {
-        (self.loads_of_exchange * self.steps_of_loads) as f64 * self.timestep
+        self.joint.exchange_time()
     }
 
     /// Exchanges made.
     pub fn exchanges(&self) -> u64 {
-        self.exchanges
+        self.joint.exchanges
     }
 
     /// Whether an exchange has just been made.
     pub fn at_exchange(&self) -> bool {
-        self.made == 0
+        self.joint.made == 0
     }
 
     /// Momentum of the grains, ball included, with what walls have taken (N s).

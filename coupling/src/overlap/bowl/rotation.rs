@@ -1,7 +1,6 @@
 //! Uniform translation and rigid rotation of both sides at once exchange no force.
 
 use super::*;
-use crate::overlap::joint::vector_over as over;
 use crate::overlap::{OverlapSettings, Scales};
 use colluvium_dem::{ContactLaw, Domain, Grain, Hooke, Setup, TangentialSpring, Threads, Wall};
 
@@ -113,11 +112,9 @@ fn exchanged(bowl: &Bowl) -> [f64; 3] {
     let shells = bowl.faces.all.iter().zip(&bowl.scratch.shell);
     let slips = shells.filter(|(face, _)| inside(face.cells[0]));
     [
-        largest(&bowl.held.accelerations),
-        largest(&bowl.held.spins),
-        slips.fold(0.0, |most: f64, (_, s)| {
-            most.max(over(s.slip, s.weight).norm())
-        }),
+        largest(&bowl.joint.accelerations),
+        largest(&bowl.joint.spins),
+        slips.fold(0.0, |most: f64, (_, s)| most.max(s.slip().norm())),
     ]
 }
 
@@ -153,16 +150,16 @@ fn a_couple_is_answered_by_forces_of_its_moment() {
     let mut bowl = joined(nothing, nothing, nothing);
     let cells = bowl.layout.cells;
     let couple = Vector3::new(0.3, -0.7, 0.2);
-    bowl.owed.fill(nothing);
-    bowl.given.spin.fill(nothing);
-    bowl.given.spin[cells.cell([4, 5, 3])] = couple;
+    bowl.joint.owed.fill(nothing);
+    bowl.joint.given.spin.fill(nothing);
+    bowl.joint.given.spin[cells.cell([4, 5, 3])] = couple;
     // At the grid's end there is nothing to take one.
-    bowl.given.spin[cells.cell([0, 5, 3])] = couple;
+    bowl.joint.given.spin[cells.cell([0, 5, 3])] = couple;
     bowl.answer_couples();
-    let force: Vector3<f64> = bowl.owed.iter().sum();
-    let rows = bowl.owed.iter().enumerate();
+    let force: Vector3<f64> = bowl.joint.owed.iter().sum();
+    let rows = bowl.joint.owed.iter().enumerate();
     let moment: Vector3<f64> = rows.map(|(k, f)| cells.centre(k).cross(f)).sum();
     assert!(force.norm() < 1e-15, "{force}");
     assert!((moment + couple).norm() < 1e-14, "{moment} {couple}");
-    assert_eq!(bowl.owed.iter().filter(|f| **f != nothing).count(), 6);
+    assert_eq!(bowl.joint.owed.iter().filter(|f| **f != nothing).count(), 6);
 }

@@ -99,7 +99,7 @@ impl Bowl {
         }
         let each = self.unborne / bearers.len() as f64;
         for cell in bearers {
-            self.owed[cell] -= each;
+            self.joint.owed[cell] -= each;
         }
         self.unborne = Vector3::zeros();
     }

@@ -2,6 +2,7 @@
 
 use super::Bowl;
 use super::zone::Side;
+use crate::overlap::slips::{temperatures, variances};
 use crate::overlap::windows::Of;
 use colluvium_dem::GrainSample;
 use nalgebra::Vector3;
@@ -15,48 +16,16 @@ impl Bowl {
     /// Takes in the impulses of what the grains were given.
     pub(super) fn watch_impulses(&mut self) {
         let dt = self.exchange_time();
-        let variances = self.variances();
-        for (cell, (impulse, [buffer, _])) in
-            self.given.relaxation.iter().zip(&variances).enumerate()
-        {
-            // Cells that relax nothing have no noise of it, either.
-            if *impulse != Vector3::zeros() {
-                self.windows.relax(cell, (*impulse).into(), *buffer, dt);
-            }
-        }
+        let variances = variances(self.met(), self.layout.cells.count(), |g| {
+            self.fluctuation(g)
+        });
+        self.joint.watch_relaxation(&variances);
         for (face, traction) in self.faces.all.iter().zip(&self.held.traction) {
             let impulse = (traction * dt).into();
-            self.windows
+            self.joint
+                .windows
                 .add(Of::Traction, face.cells[0], impulse, [dt, 0.0]);
         }
-    }
-
-    /// Variance in a direction of the momenta of the grains that a cell is compared with, if they move independently: of the buffer, and of
-    /// the whole overlap (N² s²).
-    fn variances(&self) -> Vec<[f64; 2]> {
-        let [handshake, inner] = self.layout.widths;
-        let (cells, zone) = (&self.layout.cells, &self.layout.zone);
-        let belongs = self.spec.belongs();
-        let mut sums = vec![[0.0; 2]; cells.count()];
-        for grain in self.sighting.snapshot.grains.iter().filter(|g| belongs(g)) {
-            let label = zone.label(cells, &grain.position);
-            if label >= inner {
-                continue;
-            }
-            let hats = cells.hats(&grain.position);
-            if self.view.velocity_at(&hats).is_none() {
-                continue;
-            }
-            let square = grain.mass.powi(2) * self.fluctuation(grain).norm_squared() / 3.0;
-            for (cell, hat) in hats {
-                let variance = hat * hat * square;
-                sums[cell][1] += variance;
-                if label < handshake {
-                    sums[cell][0] += variance;
-                }
-            }
-        }
-        sums
     }
 
     /// Normal force (N) of the contacts that cross the handshake surface, from the nearest side of the grain outside. Averages over
@@ -84,25 +53,6 @@ impl Bowl {
         grain.velocity - mean.sum::<Vector3<f64>>()
     }
 
-    /// Granular temperature ⟨v′²⟩/3 about the mean velocity of the cells around each grain: of the buffer, of the inner overlap,
-    /// and of grains beyond it up to its width (m²/s²).
-    fn temperatures(&self) -> [f64; 3] {
-        let (cells, zone) = (&self.layout.cells, &self.layout.zone);
-        let [handshake, inner] = self.layout.widths;
-        let ends = [handshake, inner, 2.0 * inner - handshake];
-        let belongs = self.spec.belongs();
-        let mut sums = [[0.0; 2]; 3];
-        for grain in self.sighting.snapshot.grains.iter().filter(|g| belongs(g)) {
-            let label = zone.label(cells, &grain.position);
-            let Some(zone) = ends.iter().position(|end| label < *end) else {
-                continue;
-            };
-            sums[zone][0] += grain.mass * self.fluctuation(grain).norm_squared() / 3.0;
-            sums[zone][1] += grain.mass;
-        }
-        sums.map(|[energy, mass]| if mass > 0.0 { energy / mass } else { 0.0 })
-    }
-
     /// Looks at both sides of the handshake surface, after a time (s).
     pub(super) fn watch(&mut self, dt: f64) {
         let (cells, zone) = (&self.layout.cells, &self.layout.zone);
@@ -120,20 +70,21 @@ impl Bowl {
                 beside[cell] += 1.0;
             }
         }
-        let variances = self.variances();
+        let variances = variances(self.met(), cells.count(), |g| self.fluctuation(g));
         for (cell, &faces) in beside.iter().enumerate().filter(|(_, n)| **n > 0.0) {
-            let cover = &self.sums.cover[cell];
-            let slip = (cover.buffer_slip + cover.inner_slip) * faces * dt;
-            let mass = (cover.buffer + cover.inner) * faces;
+            let slip = &self.joint.slips[cell];
+            let mass = slip.mass() * faces;
+            let slip = slip.both() * faces * dt;
             let weights = [mass, variances[cell][1] * faces * faces];
-            self.windows
+            self.joint
+                .windows
                 .add(Of::Slip, cell, slip.into(), weights.map(|w| w * dt));
         }
         let beyond = -ESCAPED * self.spec.law.diameter / self.spec.settings.cell;
         let belongs = self.spec.belongs();
         let escaped = self.sighting.snapshot.grains.iter();
         let escaped = escaped.filter(|g| belongs(g) && zone.label(cells, &g.position) < beyond);
-        let escaped = escaped.count() as f64;
+        let escaped = escaped.count();
         let filled = FILLED * self.full();
         for (moved, face) in self.moved.iter_mut().zip(&self.faces.all) {
             let side = &zone.sides[face.side];
@@ -144,16 +95,8 @@ impl Bowl {
             }
             *moved += side.outwards * self.sums.cover[inside].velocity()[side.axis] * dt;
         }
-        let temperatures = self.temperatures();
-        let m = &mut self.monitors;
-        self.windows.pass(dt, &mut m.windows);
-        for (sum, temperature) in m.temperature.iter_mut().zip(temperatures) {
-            *sum += temperature;
-        }
-        m.exchanges += 1.0;
-        for (sum, force) in m.force.iter_mut().zip(force) {
-            *sum += force;
-        }
-        m.escaped = m.escaped.max(escaped);
+        let widths = self.layout.widths;
+        let temperatures = temperatures(self.labelled(), widths, |g| self.fluctuation(g));
+        self.joint.watch(force, escaped, temperatures);
     }
 }

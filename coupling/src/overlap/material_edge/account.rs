@@ -1,7 +1,8 @@
-//! What grains and continuum give each other, and what the monitors say.
+//! What grains and continuum give each other.
 
 use super::side::Side;
-use crate::overlap::windows::{self, Of, Sums};
+use crate::overlap::joint::miss_over;
+use nalgebra::Vector2;
 
 /// Momentum along x and z since the start (N s), and masses (kg).
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -9,27 +10,27 @@ pub struct Account {
     /// Of grains and continuum together at the start, each counted on its side of the handshake surface.
     pub mass: f64,
     /// Of the grains when the edge was cut, with what walls had taken.
-    pub grains_before: [f64; 2],
+    pub grains_before: Vector2<f64>,
     /// Of the continuum then.
-    pub continuum_before: [f64; 2],
+    pub continuum_before: Vector2<f64>,
     /// Weight of the grains.
-    pub weight: [f64; 2],
+    pub weight: Vector2<f64>,
     /// Of the continuum's traction on the grains.
-    pub traction: [f64; 2],
+    pub traction: Vector2<f64>,
     /// Of the impedance on the grains.
-    pub impedance: [f64; 2],
+    pub impedance: Vector2<f64>,
     /// Of the relaxation on the grains, and of what carries those that lie in the continuum; it takes the opposite.
-    pub relaxation: [f64; 2],
+    pub relaxation: Vector2<f64>,
     /// Of the relaxation on the continuum.
-    pub answer: [f64; 2],
+    pub answer: Vector2<f64>,
     /// That the copy was given when it was made anew from the grains.
-    pub following: [f64; 2],
+    pub following: Vector2<f64>,
     /// Of the relaxation on cells that had no velocity to take it.
-    pub untaken: [f64; 2],
+    pub untaken: Vector2<f64>,
     /// Weight of the continuum, copy included.
-    pub continuum_weight: [f64; 2],
+    pub continuum_weight: Vector2<f64>,
     /// That of grains which came when the edge moved, less that of those which went.
-    pub handed: [f64; 2],
+    pub handed: Vector2<f64>,
     /// Volume that the copy was given when it was made anew, in the continuum's own unit.
     pub copied: f64,
 }
@@ -47,7 +48,7 @@ impl Account {
         })
     }
 
-    fn rows(&self) -> [[f64; 2]; 11] {
+    fn rows(&self) -> [Vector2<f64>; 11] {
         [
             self.grains_before,
             self.continuum_before,
@@ -68,7 +69,7 @@ impl Account {
         let (own, more) = (self.rows(), edge.rows());
         let mut sum = self.numbers();
         for (k, (own, more)) in own.iter().zip(more).enumerate() {
-            let more = side.in_plane(more);
+            let more = side.in_plane(more.into());
             for axis in 0..2 {
                 sum[2 + 2 * k + axis] = own[axis] + more[axis];
             }
@@ -78,7 +79,7 @@ impl Account {
 
     /// From such numbers.
     pub fn of(n: &[f64; NUMBERS]) -> Self {
-        let row = |k: usize| [n[2 + 2 * k], n[3 + 2 * k]];
+        let row = |k: usize| Vector2::new(n[2 + 2 * k], n[3 + 2 * k]);
         Self {
             mass: n[0],
             copied: n[1],
@@ -98,179 +99,34 @@ impl Account {
 
     /// Error of the grains' account over its largest entry, for their momentum now with what walls have taken.
     pub fn grains_error(&self, now: [f64; 2]) -> f64 {
-        let mut largest: f64 = 0.0;
-        let misses = [0, 1].map(|axis| {
-            let entries = [
-                self.weight[axis],
-                self.traction[axis],
-                self.impedance[axis],
-                self.relaxation[axis],
-                self.handed[axis],
-            ];
-            let change = now[axis] - self.grains_before[axis];
-            let all = entries
-                .iter()
-                .copied()
-                .chain([now[axis], self.grains_before[axis]]);
-            largest = all.fold(largest, |most, entry| most.max(entry.abs()));
-            change - entries.iter().sum::<f64>()
-        });
-        quotient(misses, largest)
+        let now = now.into();
+        let given = [
+            self.weight,
+            self.traction,
+            self.impedance,
+            self.relaxation,
+            self.handed,
+        ];
+        let miss = now - self.grains_before - given.iter().sum::<Vector2<f64>>();
+        miss_over(miss, given.iter().chain([&now, &self.grains_before]))
     }
 
     /// Error of what the relaxation gave to both sides, `owed` being what the continuum has still to take, over the
     /// largest entry.
     pub fn exchange_error(&self, owed: [f64; 2]) -> f64 {
-        let misses = [0, 1].map(|axis| self.relaxation[axis] + self.answer[axis] + owed[axis]);
-        let entries = self.relaxation.iter().chain(&self.weight);
-        quotient(
-            misses,
-            entries.fold(0.0, |most, entry| most.max(entry.abs())),
-        )
+        let miss = self.relaxation + self.answer + Vector2::from(owed);
+        miss_over(miss, [&self.relaxation, &self.weight])
     }
 
     /// What the continuum has had from walls, from the ground and from the stress on its surface: what is left of its momentum now
     /// (N s).
-    pub fn from_walls_and_surface(&self, now: [f64; 2]) -> [f64; 2] {
-        [0, 1].map(|axis| {
-            now[axis]
-                - self.continuum_before[axis]
-                - self.continuum_weight[axis]
-                - self.answer[axis]
-                - self.following[axis]
-                + self.untaken[axis]
-        })
-    }
-}
-
-fn quotient(misses: [f64; 2], largest: f64) -> f64 {
-    let most = misses[0].abs().max(misses[1].abs());
-    if largest > 0.0 { most / largest } else { most }
-}
-
-/// Sums over the exchanges for means in time.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Monitors {
-    /// Exchanges seen.
-    pub exchanges: f64,
-    /// Σ of the force along x through the handshake surface, of what crosses it as grains and of the continuum's stress (N).
-    pub force: [f64; 2],
-    /// Σ of the grains' mass in the full cells of the overlap, over that of the continuum in them.
-    pub packing: f64,
-    /// Most grains beyond the edge by more than a diameter along its normal.
-    pub escaped: f64,
-    /// Steps of the continuum, and active cells in them.
-    pub steps: [f64; 2],
-    /// Largest residual of the continuum's momentum.
-    pub residual: f64,
-    /// Newton iterations of the continuum's steps, and how often one was cut and tried again.
-    pub newton: [f64; 2],
-    /// Labels renewed.
-    pub renewed: f64,
-    /// Σ of the granular temperature ⟨v′²⟩/3 of the buffer, of the inner overlap, and of as much of the grains beyond it
-    /// (m²/s²).
-    pub temperature: [f64; 3],
-    /// Work on the grains of the traction, of the impedance, and of the relaxation with what carries those that lie in the
-    /// continuum (J), by velocities when they are laid; negative where it takes energy from them.
-    pub work: [f64; 3],
-    /// Sizes of slip and relaxation.
-    pub(in crate::overlap) windows: Sums,
-}
-
-/// Numbers of the monitors without those of the windows, and with them.
-const OWN: usize = 17;
-/// See `OWN`.
-pub const MONITORED: usize = OWN + windows::NUMBERS;
-
-impl Monitors {
-    /// All of it in a row of numbers.
-    pub fn numbers(&self) -> [f64; MONITORED] {
-        let own: [f64; OWN] = [
-            self.exchanges,
-            self.force[0],
-            self.force[1],
-            self.packing,
-            self.escaped,
-            self.steps[0],
-            self.steps[1],
-            self.residual,
-            self.newton[0],
-            self.newton[1],
-            self.renewed,
-            self.temperature[0],
-            self.temperature[1],
-            self.temperature[2],
-            self.work[0],
-            self.work[1],
-            self.work[2],
-        ];
-        let windows = self.windows.numbers();
-        std::array::from_fn(|k| match k.checked_sub(OWN) {
-            None => own[k],
-            Some(k) => windows[k],
-        })
-    }
-
-    /// From such numbers.
-    pub fn of(n: &[f64; MONITORED]) -> Self {
-        Self {
-            exchanges: n[0],
-            force: [n[1], n[2]],
-            packing: n[3],
-            escaped: n[4],
-            steps: [n[5], n[6]],
-            residual: n[7],
-            newton: [n[8], n[9]],
-            renewed: n[10],
-            temperature: [n[11], n[12], n[13]],
-            work: [n[14], n[15], n[16]],
-            windows: Sums::from_numbers(&std::array::from_fn(|k| n[OWN + k])),
-        }
-    }
-
-    /// Size of the slip at the handshake surface, by means over windows in time ([`windows`]), mean over cells and windows (m/s).
-    pub fn mean_slip(&self) -> f64 {
-        self.windows.of(Of::Slip).mean()
-    }
-
-    /// What the noise of the grains' velocities alone would make it (m/s).
-    pub fn slip_noise(&self) -> f64 {
-        self.windows.of(Of::Slip).noise()
-    }
-
-    /// Largest mean of one window (m/s).
-    pub fn largest_slip(&self) -> f64 {
-        self.windows.of(Of::Slip).largest
-    }
-
-    /// Mean forces along x of grains and continuum through the handshake surface (N).
-    pub fn forces(&self) -> [f64; 2] {
-        self.force.map(|sum| sum / self.exchanges.max(1.0))
-    }
-
-    /// Force of the grains over that of the continuum at the handshake surface.
-    pub fn force_ratio(&self) -> f64 {
-        self.force[0] / self.force[1]
-    }
-
-    /// Mean granular temperatures of the buffer, the inner overlap and the grains beyond it (m²/s²).
-    pub fn temperatures(&self) -> [f64; 3] {
-        self.temperature.map(|sum| sum / self.exchanges.max(1.0))
-    }
-
-    /// Mass of the grains in the overlap over that of the continuum there.
-    pub fn packing_ratio(&self) -> f64 {
-        self.packing / self.exchanges.max(1.0)
-    }
-
-    /// Impulse of the relaxation, cell by cell, over that of the traction, row by row, by sizes of means over windows.
-    pub fn relaxation_share(&self) -> f64 {
-        self.windows.of(Of::Relaxation).size / self.windows.of(Of::Traction).size
-    }
-
-    /// What the noise of the grains' velocities alone would make it.
-    pub fn relaxation_noise(&self) -> f64 {
-        self.windows.of(Of::Relaxation).floor / self.windows.of(Of::Traction).size
+    pub fn from_walls_and_surface(&self, now: [f64; 2]) -> Vector2<f64> {
+        Vector2::from(now)
+            - self.continuum_before
+            - self.continuum_weight
+            - self.answer
+            - self.following
+            + self.untaken
     }
 }
 
@@ -279,28 +135,26 @@ mod tests {
     use super::*;
 
     #[test]
-    fn accounts_and_monitors_come_back_from_their_numbers() {
+    fn an_account_comes_back_from_its_numbers() {
         let numbers: [f64; NUMBERS] = std::array::from_fn(|k| k as f64 + 0.5);
         assert_eq!(Account::of(&numbers).numbers(), numbers);
-        let numbers: [f64; MONITORED] = std::array::from_fn(|k| k as f64 + 0.5);
-        assert_eq!(Monitors::of(&numbers).numbers(), numbers);
     }
 
     #[test]
     fn an_account_that_lacks_an_entry_does_not_close() {
         let mut account = Account {
-            grains_before: [1.0, 2.0],
-            weight: [0.0, -8.0],
-            traction: [3.0, 0.5],
-            impedance: [-1.0, 0.0],
-            relaxation: [0.25, 0.25],
+            grains_before: Vector2::new(1.0, 2.0),
+            weight: Vector2::new(0.0, -8.0),
+            traction: Vector2::new(3.0, 0.5),
+            impedance: Vector2::new(-1.0, 0.0),
+            relaxation: Vector2::new(0.25, 0.25),
             ..Account::default()
         };
         let now = [3.25, -5.25];
         assert_eq!(account.grains_error(now), 0.0);
-        account.impedance = [0.0; 2];
+        account.impedance.fill(0.0);
         assert_eq!(account.grains_error(now), 1.0 / 8.0);
-        account.answer = [-0.25, -0.125];
+        account.answer = Vector2::new(-0.25, -0.125);
         assert_eq!(account.exchange_error([0.0, -0.125]), 0.0);
         assert!(account.exchange_error([0.0; 2]) > 0.01);
     }

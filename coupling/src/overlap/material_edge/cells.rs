@@ -7,8 +7,9 @@
 //! ```
 //! l from the centre of the grain that f acts on to that of its partner, h_c at the middle of it; V = h² W.
 
-use crate::overlap::joint::over;
-use colluvium_dem::{GrainSample, Partner, Snapshot};
+use crate::overlap::joint::{along_axes, beside, lines, over, vector_over};
+use colluvium_dem::{GrainSample, Snapshot};
+use nalgebra::Vector2;
 
 /// Cells side by side over a floor that is level at z = 0, x fastest (SI).
 #[derive(Clone, Copy, Debug, PartialEq)]
@@ -38,17 +39,22 @@ impl Cells {
 
     /// The cells around a place with their hats; beyond the grid they are those at its edge.
     pub fn hats(&self, x: f64, z: f64) -> [(usize, f64); 4] {
-        let [(i, s), (k, t)] = [self.along(0, x), self.along(1, z)];
+        let (columns, rows) = (self.columns(x), self.rows(z));
         std::array::from_fn(|n| {
-            let (a, b) = (n % 2, n / 2);
-            (i[a] + self.counts[0] * k[b], s[a] * t[b])
+            let [(i, s), (k, t)] = [columns[n % 2], rows[n / 2]];
+            (i + self.counts[0] * k, s * t)
         })
+    }
+
+    /// The columns around a place along x with their hats.
+    pub fn columns(&self, x: f64) -> [(usize, f64); 2] {
+        beside(self.offset(x), [0, self.counts[0] - 1])
     }
 
     /// The rows around a height with their hats.
     pub fn rows(&self, z: f64) -> [(usize, f64); 2] {
-        let (k, t) = self.along(1, z);
-        [(k[0], t[0]), (k[1], t[1])]
+        let place = z / self.spacing - 0.5 + self.below as f64;
+        beside(place, [self.below, self.counts[1] - 1])
     }
 
     /// Lower face of the cells of a column (m).
@@ -70,19 +76,6 @@ impl Cells {
     pub fn offset(&self, x: f64) -> f64 {
         (x - self.low) / self.spacing - 0.5
     }
-
-    fn along(&self, axis: usize, at: f64) -> ([usize; 2], [f64; 2]) {
-        let place = match axis {
-            0 => self.offset(at),
-            _ => at / self.spacing - 0.5 + self.below as f64,
-        };
-        let first = [0, self.below as i64][axis];
-        let low = place.floor();
-        let share = place - low;
-        let last = self.counts[axis] as i64 - 1;
-        let index = [0, 1].map(|n| (low as i64 + n).clamp(first, last) as usize);
-        (index, [1.0 - share, share])
-    }
 }
 
 /// Sums over the grains that cover a cell.
@@ -93,27 +86,15 @@ pub struct Cover {
     /// Σ m ξ h (kg m).
     pub label: f64,
     /// Σ m v h along x and z (N s).
-    pub momentum: [f64; 2],
+    pub momentum: Vector2<f64>,
     /// Mass of the grains that the continuum has a copy of (kg).
     pub copied: f64,
-    /// Mass of the grains of the buffer (kg), and Σ m (u − v) h over them with the continuum's u at their places.
-    pub buffer: f64,
-    /// See `buffer` (N s).
-    pub buffer_slip: [f64; 2],
-    /// Σ I h over them, I = 2 m r²/5 (kg m²), and Σ I ω h about y (N m s).
-    pub turning: f64,
-    /// See `turning`.
-    pub spin: f64,
-    /// The same of the inner overlap.
-    pub inner: f64,
-    /// The same of the inner overlap (N s).
-    pub inner_slip: [f64; 2],
 }
 
 impl Cover {
     /// Mean velocity along x and z (m/s); zero without grains.
-    pub fn velocity(&self) -> [f64; 2] {
-        self.momentum.map(|p| over(p, self.mass))
+    pub fn velocity(&self) -> Vector2<f64> {
+        vector_over(self.momentum, self.mass)
     }
 
     /// Mean label (m).
@@ -159,50 +140,30 @@ impl Sums {
                 cover.mass += mass;
                 cover.copied += if label < inner { mass } else { 0.0 };
                 cover.label += mass * label;
-                cover.momentum[0] += mass * grain.velocity.x;
-                cover.momentum[1] += mass * grain.velocity.z;
+                cover.momentum += mass * along_axes(&grain.velocity);
             }
         }
     }
 
-    /// Takes the stresses of now into the averages with this weight.
+    /// Takes the stresses of now into the averages with this weight; what is held in place is wall.
     pub fn press(&mut self, cells: &Cells, snapshot: &Snapshot, weight: f64) {
         self.instant.fill([0.0; 3]);
         let per_volume = 1.0 / cells.volume();
-        for contact in &snapshot.contacts {
-            let grain = &snapshot.grains[contact.grain];
-            let other = match contact.partner {
-                Partner::Grain(j) => Some(&snapshot.grains[j]).filter(|other| !other.fixed),
-                Partner::Wall(_) | Partner::Body(_) => None,
-            };
-            // What is held in place is wall: its half of the line is not material.
-            let (start, force, branch) = match (grain.fixed, other) {
-                (false, Some(_)) => (
-                    &grain.position,
-                    contact.force,
-                    contact.arm - contact.partner_arm,
-                ),
-                (false, None) => (&grain.position, contact.force, contact.arm),
-                (true, Some(other)) => (&other.position, -contact.force, contact.partner_arm),
-                (true, None) => continue,
-            };
-            let middle = start + 0.5 * branch;
+        for [middle, force, line] in lines(snapshot, |grain| !grain.fixed) {
             let tensor = [
-                force.x * branch.x,
-                force.z * branch.z,
-                0.5 * (force.x * branch.z + force.z * branch.x),
+                force.x * line.x,
+                force.z * line.z,
+                0.5 * (force.x * line.z + force.z * line.x),
             ]
             .map(|s| s * per_volume);
             self.add(cells.hats(middle.x, middle.z), tensor);
         }
         for grain in snapshot.grains.iter().filter(|g| !g.fixed) {
             let hats = cells.hats(grain.position.x, grain.position.z);
-            let mean = |axis: usize| -> f64 {
-                let of = hats.iter();
-                of.map(|&(cell, hat)| hat * self.cover[cell].velocity()[axis])
-                    .sum()
-            };
-            let (u, w) = (grain.velocity.x - mean(0), grain.velocity.z - mean(1));
+            let mean = hats.iter();
+            let mean = mean.map(|&(cell, hat)| hat * self.cover[cell].velocity());
+            let own = along_axes(&grain.velocity) - mean.sum::<Vector2<f64>>();
+            let (u, w) = (own[0], own[1]);
             let mass = grain.mass * per_volume;
             self.add(hats, [-mass * u * u, -mass * w * w, -mass * u * w]);
         }

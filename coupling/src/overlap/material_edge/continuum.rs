@@ -5,7 +5,7 @@
 //! turned back where it is put together with what the keeper does. A cell bears the grains of that edge which has more of them there;
 //! forces of both are added.
 
-use super::account::{Account, Monitors};
+use super::account::Account;
 use super::cells::Cells;
 use super::copy::ROUNDED;
 use super::side::{Side, mirror_rows};
@@ -13,6 +13,7 @@ use super::{MaterialEdge, MaterialEdgeSpec, NEARLY, OverlapError, floor, layout,
 use colluvium_continuum::column_collapse::{Collapse, CollapseGround};
 use colluvium_continuum::free_surface::SurfaceState;
 use colluvium_dem::GrainSample;
+use nalgebra::Vector2;
 use std::ops::Range;
 
 /// What lies behind an edge, or between two. All along its keeper's axis.
@@ -179,21 +180,21 @@ impl Continuum {
         let mut is_time = false;
         for edge in edges.iter_mut() {
             edge.book_grains(simulation);
-            edge.made += 1;
-            is_time = edge.made >= edge.loads_of_exchange;
+            edge.joint.made += 1;
+            is_time = edge.joint.made >= edge.joint.loads_of_exchange;
         }
         if !is_time {
             return Ok(false);
         }
-        let exchange = edges.first().map_or(0, |edge| edge.exchanges + 1);
+        let exchange = edges.first().map_or(0, |edge| edge.joint.exchanges + 1);
         for edge in edges.iter_mut() {
             edge.take_up(self, simulation)?;
         }
         self.step(edges, exchange)?;
         for edge in edges {
             edge.see_the_step();
-            edge.made = 0;
-            edge.exchanges = exchange;
+            edge.joint.made = 0;
+            edge.joint.exchanges = exchange;
             edge.renew_labels();
         }
         Ok(true)
@@ -227,26 +228,19 @@ impl Continuum {
         let before = self.collapse.flow().state().velocity_time;
         while self.collapse.time() < until * (1.0 - 1e-12) {
             let step = self.collapse.step(until)?;
-            let seen: &mut Monitors = &mut keeper.monitors;
-            seen.steps[0] += 1.0;
-            seen.steps[1] += step.active_cells as f64;
-            seen.newton[0] += step.newton_iterations as f64;
-            seen.newton[1] += step.cuts as f64;
-            seen.residual = seen.residual.max(step.residuals.momentum);
+            keeper.joint.monitors.take_step(&step);
         }
         // Velocities have moved on by this, half a step ahead of the fractions.
         let pushed = (self.collapse.flow().state().velocity_time - before) * unit;
         let unit = self.impulse_unit();
         let untaken = self.collapse.flow_mut().take_untaken();
         let account: &mut Account = &mut keeper.account;
-        for (sum, untaken) in account.untaken.iter_mut().zip(untaken) {
-            *sum += untaken * unit;
-        }
+        account.untaken += Vector2::from(untaken) * unit;
         let mass = self.collapse.flow().volume() * unit / self.collapse.units().velocity;
         account.continuum_weight[1] -= mass * self.spec.case.gravity * pushed;
         for edge in std::iter::once(keeper).chain(other) {
             if coupled {
-                edge.answer(pushed / dt);
+                edge.joint.answer(pushed / dt, &mut edge.account.answer);
             }
             edge.look_at(self);
         }
@@ -259,49 +253,15 @@ impl Continuum {
             edge.look_at(self);
         }
         let before = self.collapse.flow().state().clone();
-        let books: Vec<_> = edges.iter().map(|e| (e.account, e.monitors)).collect();
+        let books: Vec<_> = edges
+            .iter()
+            .map(|e| (e.account, e.joint.monitors))
+            .collect();
         self.step(edges, 1)?;
         self.collapse.set_state(before)?;
         for (edge, book) in edges.iter_mut().zip(books) {
-            (edge.account, edge.monitors) = book;
+            (edge.account, edge.joint.monitors) = book;
         }
         Ok(())
     }
-}
-
-/// The state of a flow as numbers, each row with its length before it.
-pub fn write(state: &SurfaceState, put: &mut impl FnMut(&[f64])) {
-    put(&state.fractions);
-    put(&state.velocity[0]);
-    put(&state.velocity[1]);
-    put(&state.pressure);
-    put(state.stress.as_flattened());
-    put(&[
-        state.time,
-        state.velocity_time,
-        state.next_step,
-        state.steps as f64,
-    ]);
-}
-
-/// Reads it back.
-pub fn read<'a>(take: &mut impl FnMut() -> Option<&'a [f64]>) -> Option<SurfaceState> {
-    let fractions = take()?.to_vec();
-    let velocity = [take()?.to_vec(), take()?.to_vec()];
-    let pressure = take()?.to_vec();
-    let stress = take()?.as_chunks::<2>().0.to_vec();
-    let &[time, velocity_time, next_step, steps] = take()? else {
-        return None;
-    };
-    Some(SurfaceState {
-        fractions,
-        velocity,
-        pressure,
-        stress,
-        time,
-        velocity_time,
-        next_step,
-        steps: steps as usize,
-        ..SurfaceState::default()
-    })
 }

@@ -6,18 +6,17 @@
 //! ```text
 //! f = clamp(H_i/h − k, 0, 1) M(ξ < ξ_a)/M,      H_i = Σ_k M/(ρ h W)
 //! ```
-//! and its velocity follows theirs, u += (1 − e^{−Δt/t_f}) (v̄ − u), at once on faces beside no full cell. So the
-//! surface at ξ_a moves as the grains do, no matter comes loose from it, and the copy weighs what they weigh. Volume
+//! and its velocity follows theirs (`following.rs`), but for faces up to the ground's. So the surface at ξ_a moves as the grains do, no matter comes loose from it, and the copy weighs what they weigh. Volume
 //! and momentum that this adds are booked. Between two exchanges matter does come loose from the copy's end, by little and
 //! fast; it is made anew before it gets anywhere, and the next step's length must not remember how fast it was.
 
 use super::{Continuum, MaterialEdge, OverlapError};
+use crate::overlap::following::{Following, LEAST};
 use crate::overlap::joint::over;
+use nalgebra::Vector2;
 
 /// A step planned as long as an exchange but for round-off would be made in two halves.
 pub(super) const ROUNDED: f64 = 1.0 + 1e-6;
-/// Cells with less than this part of a full cell's mass in grains have no velocity to follow.
-const LEAST: f64 = 0.05;
 
 impl MaterialEdge {
     /// Makes the copy anew, after a time (s) with the last one.
@@ -59,35 +58,17 @@ impl MaterialEdge {
             }
         }
         let part = -(-dt / self.spec.settings.following_time).exp_m1();
-        for axis in 0..2 {
-            let (width, step) = match axis {
-                0 => (columns + 1, 1),
-                _ => (columns, columns),
-            };
-            for (face, u) in state.velocity[axis].iter_mut().enumerate() {
-                let (i, k) = (face % width, face / width);
-                // Faces on the edges of the grid are walls, and so is the ground below the grains.
-                let first = [0, self.cells.below][axis];
-                if [i, k][axis] <= first || [i, k][axis] == self.cells.counts[axis] {
-                    continue;
-                }
-                let high = i + columns * k;
-                let pair = [high - step, high];
-                if !pair.into_iter().all(is_copy) {
-                    continue;
-                }
-                let covers = pair.map(|cell| &self.sums.cover[cell]);
-                let mass = covers[0].mass + covers[1].mass;
-                if mass < LEAST * full {
-                    *u = 0.0;
-                    continue;
-                }
-                let mean =
-                    (covers[0].momentum[axis] + covers[1].momentum[axis]) / mass / units.velocity;
-                let is_inside = pair.into_iter().any(|cell| state.fractions[cell] > 0.5);
-                *u += if is_inside { part } else { 1.0 } * (mean - *u);
-            }
-        }
+        let following = Following {
+            counts: self.cells.counts,
+            walls: [0, self.cells.below],
+            full,
+            part,
+            unit: units.velocity,
+        };
+        let cover = &self.sums.cover;
+        following.follow(&mut state.velocity, &state.fractions, is_copy, |cell| {
+            (cover[cell].mass, cover[cell].momentum)
+        });
         continuum.turn(side, &mut state);
         let collapse = &mut continuum.collapse;
         collapse.set_state(state)?;
@@ -95,10 +76,7 @@ impl MaterialEdge {
         collapse.flow_mut().renew_step(ROUNDED * exchange);
         self.account.copied += collapse.flow().volume() - before;
         let now = side.in_plane(continuum.momentum());
-        let changes = now.iter().zip(momentum_before);
-        for (sum, (now, before)) in self.account.following.iter_mut().zip(changes) {
-            *sum += now - before;
-        }
+        self.account.following += Vector2::from(now) - Vector2::from(momentum_before);
         self.look_at(continuum);
         Ok(())
     }

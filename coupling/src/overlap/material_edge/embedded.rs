@@ -14,8 +14,9 @@
 //! D. J. Durian, Phys. Rev. Lett. 111 (2013) 168002). The continuum takes the opposite of F, with what the relaxation gave.
 
 use super::MaterialEdge;
+use super::side::in_slab;
 use colluvium_dem::GrainSample;
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
 /// t_e over √(d/g).
 const STOPPING: f64 = 0.1;
@@ -26,7 +27,7 @@ const FEWEST: f64 = 2.0;
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
 pub(super) struct Embedded {
     pub weight: f64,
-    pub velocity: [f64; 2],
+    pub velocity: Vector2<f64>,
 }
 
 impl Embedded {
@@ -38,8 +39,7 @@ impl Embedded {
         gravity: &Vector3<f64>,
         stopping: f64,
     ) -> Vector3<f64> {
-        let [u, w] = self.velocity;
-        let slip = grain.velocity - Vector3::new(u, 0.0, w);
+        let slip = grain.velocity - in_slab(self.velocity);
         -self.weight * grain.mass * (gravity + slip / stopping)
     }
 }
@@ -68,7 +68,7 @@ impl MaterialEdge {
     pub(super) fn embedded_time(&self) -> f64 {
         let case = &self.spec.case;
         let natural = (case.rheology.diameter / case.gravity).sqrt();
-        let held = self.steps_of_loads as f64 * self.timestep;
+        let held = self.joint.steps_of_loads as f64 * self.joint.timestep;
         (STOPPING * natural).max(FEWEST * held)
     }
 }

@@ -1,13 +1,16 @@
 //! The steps: grains under what is held, and the exchange that follows so many of them.
 
 use super::embedded::Embedded;
-use super::rows::{Load, Row, bearers, slopes};
+use super::rows::{Row, bearers, slopes};
+use super::side::in_slab;
 use super::{Continuum, MaterialEdge, OverlapError, Side};
 use crate::overlap::angular::{AngularBook, Counterpart, Parts};
-use crate::overlap::joint::{self, LEAST_BUFFER, inertia, over, towards};
+use crate::overlap::cell_joint::Shell;
+use crate::overlap::joint::{self, along_axes, inertia};
+use crate::overlap::slips::{Met, compare};
 use colluvium_continuum::units::Units;
-use colluvium_dem::{GrainSample, Load as Laid, Simulation};
-use nalgebra::Vector3;
+use colluvium_dem::{GrainSample, Load, Simulation};
+use nalgebra::{Vector1, Vector2, Vector3};
 
 /// Rows with less than this of a full row of shell hand on what presses on them: a force on few grains throws them out.
 pub(super) const LEAST_ROW: f64 = 0.3;
@@ -18,52 +21,29 @@ pub(super) const STEEPEST: f64 = 2.0;
 #[derive(Clone, Debug, Default)]
 pub struct Scratch {
     near: Vec<(GrainSample, f64, Embedded)>,
-    pub(super) shell: Vec<Load>,
+    pub(super) shell: Vec<Shell<2>>,
     bearers: Vec<usize>,
-    forces: Vec<[f64; 2]>,
-}
-
-/// A vector of the plane x–z in space.
-fn in_slab([x, z]: [f64; 2]) -> Vector3<f64> {
-    Vector3::new(x, 0.0, z)
 }
 
 impl MaterialEdge {
     /// Books the impulses of what was laid over the steps made since.
     pub(super) fn book_grains(&mut self, simulation: &Simulation) {
-        let time = self.acting(simulation);
-        for (sum, force) in self.given.relaxation.iter_mut().zip(&self.laid.relaxation) {
-            for (sum, force) in sum.iter_mut().zip(force) {
-                *sum += force * time;
-            }
-        }
-        for (sum, moment) in self.given.spin.iter_mut().zip(&self.laid.spin) {
-            *sum += moment * time;
-        }
-        for (work, power) in self.monitors.work.iter_mut().zip(self.laid.powers) {
-            *work += power * time;
-        }
-        for axis in 0..2 {
-            let relaxation: f64 = self.laid.relaxation.iter().map(|f| f[axis]).sum();
-            self.given.traction[axis] += self.laid.traction[axis] * time;
-            self.given.impedance[axis] += self.laid.impedance[axis] * time;
-            self.account.relaxation[axis] += relaxation * time;
-        }
+        self.account.relaxation += self.joint.book(simulation);
     }
 
     /// Forms the loads of the next steps, along x, in the order of the grains' numbers, noting what they consist of.
     pub(super) fn lay(
         &mut self,
         simulation: &Simulation,
-        loads: &mut Vec<Laid>,
+        loads: &mut Vec<Load>,
         mut angular: Option<&mut AngularBook>,
     ) {
-        self.laid_at = simulation.steps_done();
-        self.laid.clear();
+        self.joint.lay_anew(simulation);
         if self.spec.settings.uncoupled {
             return;
         }
         let side = self.spec.side;
+        let in_space = |v: Vector2<f64>| side.turned(in_slab(v));
         let (shell, buffer) = (self.spec.settings.shell, self.spec.settings.buffer);
         let mut scratch = std::mem::take(&mut self.scratch);
         let reach = self.held.reach;
@@ -78,12 +58,11 @@ impl MaterialEdge {
         );
         // Rows may stand in another order after a restart, and sums over them end in other bits.
         scratch.near.sort_unstable_by_key(|(grain, ..)| grain.id);
-        let rows = self.held.rows.len();
         let weight = |grain: &GrainSample, label: f64, embedded: &Embedded| {
             (1.0 - embedded.weight) * grain.mass * ((shell - label) / shell).clamp(0.0, 1.0)
         };
         scratch.shell.clear();
-        scratch.shell.resize(rows, Load::default());
+        scratch.shell.resize(self.held.rows.len(), Shell::NONE);
         for (grain, label, embedded) in &scratch.near {
             let q = weight(grain, *label, embedded);
             if q <= 0.0 {
@@ -92,40 +71,32 @@ impl MaterialEdge {
             let hats = self.cells.hats(grain.position.x, grain.position.z);
             let beside = self.view.velocity_at(&hats);
             for (row, hat) in self.cells.rows(grain.position.z) {
-                let [u, w] = beside.unwrap_or(self.held.rows[row].velocity);
-                let load = &mut scratch.shell[row];
-                load.weight += q * hat;
-                load.slip[0] += q * hat * (grain.velocity.x - u);
-                load.slip[1] += q * hat * (grain.velocity.z - w);
-                load.momentum[0] += q * hat * grain.velocity.x;
-                load.momentum[1] += q * hat * grain.velocity.z;
+                let u = beside.unwrap_or(self.held.rows[row].velocity);
+                scratch.shell[row].add(q * hat, along_axes(&grain.velocity), u);
             }
         }
         let full = 0.5 * self.spec.density() * shell * self.cells.spacing * self.spec.slab;
         let least = LEAST_ROW * full;
         bearers(&scratch.shell, least, &mut scratch.bearers);
         let mut pressed = Counterpart::default();
-        scratch.forces.clear();
-        scratch.forces.resize(rows, [0.0; 2]);
         for (k, row) in self.held.rows.iter().enumerate() {
             let bearer = scratch.bearers[k];
             if bearer == usize::MAX {
                 continue;
             }
-            let load = &scratch.shell[bearer];
-            let slip = load.slip.map(|p| over(p, load.weight));
-            let impedance = row.impedance(self.spec.settings.impedance, slip);
-            let force = [0, 1].map(|axis| row.traction[axis] + impedance[axis]);
-            let at = [row.place, self.cells.height(k)];
-            let [at, on_face] = [at, force].map(|v| in_slab(side.in_plane(v)));
+            let load = &mut scratch.shell[bearer];
+            let impedance = row.impedance(self.spec.settings.impedance, load.slip());
+            let at = Vector2::new(row.place, self.cells.height(k));
+            let [at, on_face] = [at, row.traction + impedance].map(in_space);
             pressed.add(0, &at, &on_face);
-            let velocity = load.momentum.map(|p| over(p, load.weight));
-            for (axis, (traction, impedance)) in row.traction.iter().zip(impedance).enumerate() {
-                self.laid.powers[0] += traction * velocity[axis];
-                self.laid.powers[1] += impedance * velocity[axis];
-                scratch.forces[bearer][axis] += traction + impedance;
-                self.laid.traction[axis] += traction;
-                self.laid.impedance[axis] += impedance;
+            let velocity = load.velocity();
+            load.force += row.traction + impedance;
+            let laid = &mut self.joint.laid;
+            laid.traction += row.traction;
+            laid.impedance += impedance;
+            for (axis, velocity) in velocity.iter().enumerate() {
+                laid.powers[0] += row.traction[axis] * velocity;
+                laid.powers[1] += impedance[axis] * velocity;
             }
         }
         let gravity = side.turned(simulation.gravity());
@@ -133,14 +104,12 @@ impl MaterialEdge {
         let mut relaxation = 0.0;
         for (grain, label, embedded) in &scratch.near {
             let q = weight(grain, *label, embedded);
-            let mut force = [0.0; 2];
+            let mut force = Vector2::zeros();
             if q > 0.0 {
                 for (row, hat) in self.cells.rows(grain.position.z) {
-                    let all = scratch.shell[row].weight;
-                    if all > least {
-                        for (sum, part) in force.iter_mut().zip(scratch.forces[row]) {
-                            *sum += q * hat / all * part;
-                        }
+                    let shell = &scratch.shell[row];
+                    if shell.weight > least {
+                        force += q * hat / shell.weight * shell.force;
                     }
                 }
             }
@@ -151,29 +120,27 @@ impl MaterialEdge {
             let mut moment = 0.0;
             relaxation += carried.y * grain.velocity.y;
             for (cell, hat) in self.cells.hats(grain.position.x, grain.position.z) {
-                let turn = hat * turned * self.held.spins[cell];
-                self.laid.spin[cell] += turn;
+                let turn = hat * turned * self.joint.spins[cell][0];
+                self.joint.laid.spin[cell][0] += turn;
                 moment += turn;
-                let laid = &mut self.laid.relaxation[cell];
-                for axis in 0..2 {
-                    let relaxed = relaxed * self.held.accelerations[cell][axis];
-                    let pull = hat * (relaxed + [carried.x, carried.z][axis]);
-                    laid[axis] += pull;
-                    force[axis] += pull;
-                    relaxation += pull * [grain.velocity.x, grain.velocity.z][axis];
-                }
+                let relaxed = relaxed * self.joint.accelerations[cell];
+                let pull = hat * (relaxed + along_axes(&carried));
+                self.joint.laid.relaxation[cell] += pull;
+                force += pull;
+                relaxation += pull[0] * grain.velocity.x;
+                relaxation += pull[1] * grain.velocity.z;
             }
             relaxation += moment * grain.spin.y;
-            if force != [0.0; 2] || carried.y != 0.0 || moment != 0.0 {
+            if force != Vector2::zeros() || carried.y != 0.0 || moment != 0.0 {
                 let moment = side.turned_about(Vector3::y() * moment);
                 let all = side.turned([force[0], carried.y, force[1]].into());
-                loads.push(Laid {
+                loads.push(Load {
                     grain: grain.id,
                     force: all,
                     moment,
                 });
                 if let Some(book) = &mut angular {
-                    let traction = in_slab(side.in_plane(traction));
+                    let traction = in_space(traction);
                     let parts = Parts {
                         traction,
                         relaxation: all - traction,
@@ -183,15 +150,13 @@ impl MaterialEdge {
                 }
             }
         }
-        self.laid.powers[2] = relaxation;
+        self.joint.laid.powers[2] = relaxation;
         if let Some(book) = angular {
             let columns = self.cells.counts[0];
-            for (cell, force) in self.laid.relaxation.iter().enumerate() {
-                let at = [
-                    self.cells.centre(cell % columns),
-                    self.cells.height(cell / columns),
-                ];
-                let [at, on_cell] = [at, *force].map(|v| in_slab(side.in_plane(v)));
+            for (cell, force) in self.joint.laid.relaxation.iter().enumerate() {
+                let (i, k) = (cell % columns, cell / columns);
+                let at = Vector2::new(self.cells.centre(i), self.cells.height(k));
+                let [at, on_cell] = [at, *force].map(in_space);
                 pressed.add(1, &at, &on_cell);
             }
             book.answered_by(&pressed);
@@ -204,17 +169,17 @@ impl MaterialEdge {
     pub(super) fn answer_couples(&mut self) {
         let [columns, rows] = self.cells.counts;
         let arm = 4.0 * self.cells.spacing;
-        for (cell, given) in self.given.spin.iter().enumerate() {
+        for (cell, given) in self.joint.given.spin.iter().enumerate() {
             let (i, k) = (cell % columns, cell / columns);
             let is_inside = i > 0 && i + 1 < columns && k > self.cells.below && k + 1 < rows;
-            if *given == 0.0 || !is_inside {
+            if given[0] == 0.0 || !is_inside {
                 continue;
             }
-            let force = -given / arm;
-            self.owed[cell + columns][0] += force;
-            self.owed[cell - columns][0] -= force;
-            self.owed[cell + 1][1] -= force;
-            self.owed[cell - 1][1] += force;
+            let force = -given[0] / arm;
+            self.joint.owed[cell + columns][0] += force;
+            self.joint.owed[cell - columns][0] -= force;
+            self.joint.owed[cell + 1][1] -= force;
+            self.joint.owed[cell - 1][1] += force;
         }
     }
 
@@ -227,18 +192,12 @@ impl MaterialEdge {
         let dt = self.exchange_time();
         self.look(simulation);
         self.sum_up(-(-dt / self.spec.settings.stress_time).exp_m1());
-        for (owed, given) in self.owed.iter_mut().zip(&self.given.relaxation) {
-            for (owed, given) in owed.iter_mut().zip(given) {
-                *owed -= given;
-            }
-        }
+        self.joint.owe();
         self.answer_couples();
         self.watch_impulses();
-        for axis in 0..2 {
-            self.account.traction[axis] += self.given.traction[axis];
-            self.account.impedance[axis] += self.given.impedance[axis];
-        }
-        self.given.clear();
+        self.account.traction += self.joint.given.traction;
+        self.account.impedance += self.joint.given.impedance;
+        self.joint.given.clear();
         if !self.spec.settings.uncoupled {
             self.copy_the_grains(continuum, dt)?;
         }
@@ -291,7 +250,7 @@ impl MaterialEdge {
             outside.stress[cell] = [0.5 * (xx - zz) * stress, xz * stress];
             outside.cover[cell] = joint::cover(part);
             outside.share[cell] = joint::share(part, cover.label(), zones);
-            self.outside.force[cell] = self.owed[cell].map(|owed| owed / dt * force);
+            self.outside.force[cell] = self.joint.owed[cell].map(|owed| owed / dt * force).into();
         }
     }
 
@@ -315,82 +274,46 @@ impl MaterialEdge {
         }
     }
 
-    /// Books that the continuum has taken this part of what it owed.
-    pub(super) fn answer(&mut self, part: f64) {
-        for owed in &mut self.owed {
-            for (axis, owed) in owed.iter_mut().enumerate() {
-                let answer = *owed * part;
-                *owed -= answer;
-                self.account.answer[axis] += answer;
-            }
-        }
-    }
-
     /// Looks at its continuum along its own axis.
     pub(super) fn look_at(&mut self, continuum: &Continuum) {
         let as_seen = continuum.spec.side.seen_along(self.spec.side);
         self.view.look(&continuum.collapse, &self.cells, as_seen);
     }
 
-    /// Slips between both sides, with the same hats at the grains' own places.
-    fn slips(&mut self) {
+    /// Grains with their labels (m).
+    pub(super) fn labelled(&self) -> impl Iterator<Item = (&GrainSample, f64)> {
+        let grains = self.sighting.snapshot.grains.iter();
+        grains.filter_map(|grain| Some((grain, self.labels.of(grain)?)))
+    }
+
+    /// Those of the overlap that lie in the continuum.
+    pub(super) fn met(&self) -> impl Iterator<Item = Met<'_, 2, 4>> {
         let [handshake, inner] = self.spec.zones();
-        for cover in &mut self.sums.cover {
-            (cover.buffer, cover.buffer_slip) = (0.0, [0.0; 2]);
-            (cover.turning, cover.spin) = (0.0, 0.0);
-            (cover.inner, cover.inner_slip) = (0.0, [0.0; 2]);
-        }
-        for grain in &self.sighting.snapshot.grains {
-            let Some(label) = self.labels.of(grain).filter(|label| *label < inner) else {
-                continue;
-            };
+        let overlap = self.labelled().filter(move |(_, label)| *label < inner);
+        overlap.filter_map(move |(grain, label)| {
             let hats = self.cells.hats(grain.position.x, grain.position.z);
-            let Some(u) = self.view.velocity_at(&hats) else {
-                continue;
-            };
-            let slip = [u[0] - grain.velocity.x, u[1] - grain.velocity.z];
-            for (cell, hat) in hats {
-                let cover = &mut self.sums.cover[cell];
-                let mass = grain.mass * hat;
-                let (sum, slips) = match label < handshake {
-                    true => (&mut cover.buffer, &mut cover.buffer_slip),
-                    false => (&mut cover.inner, &mut cover.inner_slip),
-                };
-                *sum += mass;
-                for (sum, slip) in slips.iter_mut().zip(slip) {
-                    *sum += mass * slip;
-                }
-                if label < handshake {
-                    let turning = inertia(grain) * hat;
-                    cover.turning += turning;
-                    cover.spin += turning * grain.spin.y;
-                }
-            }
-        }
+            Some(Met {
+                grain,
+                is_buffer: label < handshake,
+                hats,
+                velocity: self.view.velocity_at(&hats)?,
+            })
+        })
     }
 
     /// Takes the continuum's traction, forms the accelerations that bring mean velocities together, and mean spins to the rotation rate of the
     /// material, and finds the edge and the handshake surface.
     pub(super) fn agree(&mut self) {
-        self.slips();
-        let dt = self.exchange_time();
-        let rate = towards(dt, self.spec.settings.relaxation_time);
-        let turn = towards(dt, self.spec.settings.spin_time);
-        let full = self.full();
-        for cell in 0..self.cells.count() {
-            let cover = &self.sums.cover[cell];
-            let holds = self.view.is_full(cell) && cover.buffer > LEAST_BUFFER * full;
-            self.held.accelerations[cell] = match holds {
-                true => cover.buffer_slip.map(|slip| rate * slip / cover.buffer),
-                false => [0.0; 2],
-            };
-            self.held.spins[cell] = match holds {
-                true => {
-                    turn * (self.view.rotation(&self.cells, cell) - over(cover.spin, cover.turning))
-                }
-                false => 0.0,
-            };
-        }
+        let mut slips = std::mem::take(&mut self.joint.slips);
+        compare(self.met(), &mut slips);
+        self.joint.slips = slips;
+        let (full, view) = (self.full(), &self.view);
+        self.joint.relax(
+            &self.spec.settings,
+            full,
+            |cell| view.is_full(cell),
+            |cell| Vector1::new(view.rotation(&self.cells, cell)),
+        );
         self.find_edge();
         self.held.handshake = self.surface_of(self.spec.settings.buffer);
     }
@@ -398,12 +321,9 @@ impl MaterialEdge {
     fn find_edge(&mut self) {
         let d = self.spec.case.rheology.diameter;
         let buffer = self.spec.settings.buffer;
-        let snapshot = &self.sighting.snapshot;
-        let near = snapshot
-            .grains
-            .iter()
-            .filter(|g| self.labels.of(g).is_some_and(|label| label < buffer));
-        self.held.reach = near.fold(self.spec.wall, |most: f64, g| most.max(g.position.x)) + d;
+        let near = self.labelled().filter(|(_, label)| *label < buffer);
+        let farthest = near.fold(self.spec.wall, |most: f64, (g, _)| most.max(g.position.x));
+        self.held.reach = farthest + d;
         let places = self.surface_of(0.5 * self.spec.settings.shell);
         let slopes = slopes(&places, &self.cells);
         let (h, slab) = (self.cells.spacing, self.spec.slab);
@@ -418,10 +338,9 @@ impl MaterialEdge {
                 continue;
             };
             let slope = slopes[k].clamp(-STEEPEST, STEEPEST);
-            let area = [-h * slab * fraction, h * slab * fraction * slope];
-            row.area = area;
-            row.velocity = velocity;
-            row.traction = [xx * area[0] + xz * area[1], xz * area[0] + zz * area[1]];
+            let area = Vector2::new(-h * slab * fraction, h * slab * fraction * slope);
+            (row.area, row.velocity) = (area, velocity);
+            row.traction = Vector2::new(xx * area[0] + xz * area[1], xz * area[0] + zz * area[1]);
         }
     }
 

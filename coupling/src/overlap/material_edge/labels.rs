@@ -137,7 +137,7 @@ impl MaterialEdge {
         let places = [&edge, &self.held.handshake, &far].map(Vec::as_slice);
         let at = ([0.0, handshake, inner], self.spec.settings.shell);
         let grains = &self.sighting.snapshot.grains;
-        self.monitors.renewed += self.labels.renew(&self.cells, grains, places, at);
+        self.renewed += self.labels.renew(&self.cells, grains, places, at);
     }
 }
 

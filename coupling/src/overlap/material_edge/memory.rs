@@ -3,12 +3,12 @@
 //! In front stands what every load changes, of a length that does not; behind it what an exchange changes, in rows
 //! with their lengths before them. A continuum stands with its keeper.
 
-use super::account::{self, Account, Monitors};
+use super::account::{self, Account};
 use super::rows::{self, Row};
 use super::travel::{Journey, Move};
-use super::{
-    Continuum, GrainZone, MaterialEdge, MaterialEdgeSpec, OverlapError, continuum, layout,
-};
+use super::{Continuum, GrainZone, MaterialEdge, MaterialEdgeSpec, OverlapError, layout};
+use crate::overlap::cell_joint::CellJoint;
+use crate::overlap::state_rows;
 use colluvium_continuum::column_collapse::CollapseGround;
 use colluvium_continuum::strain::SPACE_COMPONENTS;
 use colluvium_dem::{Patch, Simulation};
@@ -16,27 +16,11 @@ use std::ops::Range;
 
 /// Numbers in front of those of the edges, with the lengths of which they end: how many there are, and steps of grains.
 const HEAD: usize = 2 + account::NUMBERS;
-/// Numbers in front of an edge's but for the rows of forces and moments by cell, the account among them.
-const FRONT: usize = 17 + account::NUMBERS;
 
 impl MaterialEdge {
     /// What every load changes.
     fn front(&self) -> Vec<f64> {
-        let mut front = Vec::with_capacity(FRONT + 6 * self.cells.count());
-        let cells = self.cells.count() as f64;
-        front.extend([cells, self.made as f64, self.laid_at as f64]);
-        for given in [&self.laid, &self.given] {
-            front.extend(given.traction);
-            front.extend(given.impedance);
-        }
-        front.extend(self.monitors.work);
-        front.extend(self.laid.powers);
-        front.extend(self.account.numbers());
-        front.extend(self.laid.relaxation.as_flattened());
-        front.extend(self.given.relaxation.as_flattened());
-        front.extend(&self.laid.spin);
-        front.extend(&self.given.spin);
-        front
+        self.joint.front(&self.account.numbers())
     }
 
     /// Writes what has changed since an exchange over what [`write`](Self::write) wrote after it.
@@ -53,13 +37,13 @@ impl MaterialEdge {
             memory.extend(row);
         };
         put(&[
-            self.exchanges as f64,
             continuum.mass,
             continuum.rest_mass,
             self.held.reach,
+            self.packed,
+            self.renewed,
         ]);
-        put(&self.monitors.numbers());
-        put(&self.windows.numbers());
+        self.joint.write(&mut put);
         put(&self.labels.given);
         put(&self.labels.base);
         let journey = &self.journey;
@@ -80,16 +64,13 @@ impl MaterialEdge {
             put(&strip.numbers());
         }
         put(self.sums.stress.as_flattened());
-        put(self.held.accelerations.as_flattened());
-        put(&self.held.spins);
         let rows: Vec<f64> = self.held.rows.iter().flat_map(Row::numbers).collect();
         put(&rows);
         put(&self.held.handshake);
-        put(self.owed.as_flattened());
         put(&[self.view.rest.ratio]);
         put(self.view.rest.strain.as_flattened());
         if keeps {
-            continuum::write(continuum.collapse.flow().state(), &mut put);
+            state_rows::write(continuum.collapse.flow().state(), &mut put);
         }
     }
 
@@ -102,9 +83,7 @@ impl MaterialEdge {
         known: &mut Option<Continuum>,
         simulation: &Simulation,
     ) -> Result<Option<Self>, OverlapError> {
-        let cells = memory.first().map_or(0, |cells| *cells as usize);
-        let front = FRONT + 6 * cells;
-        let Some((front, mut rest)) = memory.split_at_checked(front) else {
+        let Some((front, mut rest)) = CellJoint::<2, 1>::split(memory, account::NUMBERS) else {
             return Ok(None);
         };
         let mut take = || {
@@ -113,13 +92,9 @@ impl MaterialEdge {
             rest = after;
             Some(row)
         };
-        let Some(([exchanges, mass, rest_mass, reach], monitors)) = take()
-            .and_then(|row| <[f64; 4]>::try_from(row).ok())
-            .zip(take().and_then(|row| row.try_into().ok()))
+        let (Some(&[mass, rest_mass, reach, packed, renewed]), Some(joint), Some(labels)) =
+            (take(), CellJoint::<2, 1>::rows(&mut take), take())
         else {
-            return Ok(None);
-        };
-        let Some((window, labels)) = take().zip(take()) else {
             return Ok(None);
         };
         let keeps = known.is_none();
@@ -178,58 +153,34 @@ impl MaterialEdge {
             refusing,
             displaced,
         };
-        let Some([stress, accelerations, spins, edge_rows, handshake, owed]) =
-            (|| Some([take()?, take()?, take()?, take()?, take()?, take()?]))()
-        else {
+        let Some([stress, edge_rows, handshake]) = (|| Some([take()?, take()?, take()?]))() else {
             return Ok(None);
         };
         let Some((&[ratio], strain)) = take().zip(take()) else {
             return Ok(None);
         };
-        let state = keeps.then(|| continuum::read(&mut take));
+        let state = keeps.then(|| state_rows::read(&mut take));
         if state.as_ref().is_some_and(Option::is_none) {
             return Ok(None);
         }
+        let cells = edge.cells.count();
         let fits = stress.len() == 3 * cells
-            && accelerations.len() == 2 * cells
-            && spins.len() == cells
-            && owed.len() == 2 * cells
             && strain.len() == SPACE_COMPONENTS * cells
             && edge_rows.len() == rows::NUMBERS * handshake.len()
-            && handshake.len() == edge.cells.counts[1]
-            && edge.cells.count() == cells;
-        let (scalars, forces) = front.split_at(FRONT);
-        let Ok(account) = scalars[17..].try_into() else {
+            && handshake.len() == edge.cells.counts[1];
+        let account = edge.joint.fill(front, account::NUMBERS, joint);
+        let Some(account) = account.and_then(|numbers| numbers.try_into().ok()) else {
             return Ok(None);
         };
         if !fits {
             return Ok(None);
         }
         edge.sums.stress = stress.as_chunks::<3>().0.to_vec();
-        edge.held.accelerations = accelerations.as_chunks::<2>().0.to_vec();
-        edge.held.spins = spins.to_vec();
         let numbers = edge_rows.as_chunks::<{ rows::NUMBERS }>().0;
         edge.held.rows = numbers.iter().map(Row::of).collect();
         edge.held.handshake = handshake.to_vec();
         edge.held.reach = reach;
-        edge.owed = owed.as_chunks::<2>().0.to_vec();
-        if edge.windows.take_up(window).is_none() {
-            return Ok(None);
-        }
-        edge.monitors = Monitors::of(monitors);
-        edge.monitors.work = [scalars[11], scalars[12], scalars[13]];
-        edge.exchanges = exchanges as u64;
-        edge.made = scalars[1] as u64;
-        edge.laid_at = scalars[2] as u64;
-        for (k, given) in [&mut edge.laid, &mut edge.given].into_iter().enumerate() {
-            let n = &scalars[3 + 4 * k..];
-            given.traction = [n[0], n[1]];
-            given.impedance = [n[2], n[3]];
-            let own = &forces[2 * cells * k..2 * cells * (k + 1)];
-            given.relaxation = own.as_chunks::<2>().0.to_vec();
-            given.spin = forces[cells * (4 + k)..cells * (5 + k)].to_vec();
-        }
-        edge.laid.powers = [scalars[14], scalars[15], scalars[16]];
+        (edge.packed, edge.renewed) = (packed, renewed);
         edge.account = Account::of(account);
         if let Some(state) = state.flatten() {
             continuum.collapse.set_state(state)?;

@@ -46,7 +46,8 @@ mod watch;
 mod witness;
 mod zone;
 
-pub use account::{Account, Monitors};
+pub use super::cell_monitors::CellMonitors as Monitors;
+pub use account::Account;
 pub use cells::Cells;
 pub use continuum::Continuum;
 pub use floor::LEVEL;
@@ -56,11 +57,10 @@ pub use witness::{Through, Witness};
 pub use zone::GrainZone;
 
 use super::OverlapError;
-use super::joint;
+use super::cell_joint::CellJoint;
 use super::rest_stress::RestStress;
 use super::settings::Resolved;
 use super::sighting::{Sighting, free_grains};
-use super::windows::Windows;
 use cells::Sums;
 use colluvium_continuum::column_collapse::CollapseCase;
 use colluvium_continuum::free_surface::{Outside, SurfaceOptions};
@@ -146,43 +146,11 @@ impl MaterialEdgeSpec {
 /// What acts on the grains until the next exchange.
 #[derive(Clone, Debug, Default, PartialEq)]
 struct Held {
-    /// Accelerations of mean velocities of the buffer, cell by cell (m/s²).
-    accelerations: Vec<[f64; 2]>,
-    /// Angular accelerations of their mean spins about y (rad/s²).
-    spins: Vec<f64>,
     rows: Vec<Row>,
     /// No grain of the buffer lies farther than this (m).
     reach: f64,
     /// Where the handshake surface is, row by row (m).
     handshake: Vec<f64>,
-}
-
-/// Sums of forces that are laid (N), or of their impulses since the last exchange (N s).
-#[derive(Clone, Debug, Default, PartialEq)]
-struct Given {
-    relaxation: Vec<[f64; 2]>,
-    /// Moments of the relaxation of spins about y, by cell (N m, or N m s).
-    spin: Vec<f64>,
-    traction: [f64; 2],
-    impedance: [f64; 2],
-    /// Powers of traction, impedance and relaxation when they were laid (W); of what is laid alone.
-    powers: [f64; 3],
-}
-
-impl Given {
-    fn nothing(cells: usize) -> Self {
-        Self {
-            relaxation: vec![[0.0; 2]; cells],
-            spin: vec![0.0; cells],
-            ..Self::default()
-        }
-    }
-
-    fn clear(&mut self) {
-        self.relaxation.fill([0.0; 2]);
-        self.spin.fill(0.0);
-        (self.traction, self.impedance, self.powers) = ([0.0; 2], [0.0; 2], [0.0; 3]);
-    }
 }
 
 /// Grains and continuum joined at an edge that moves with them: one of a [`GrainZone`]'s. All along its own axis but for what is
@@ -200,22 +168,12 @@ pub struct MaterialEdge {
     sums: Sums,
     view: View,
     held: Held,
-    laid: Given,
-    given: Given,
-    /// Steps that the grains had made when this was laid.
-    laid_at: u64,
-    /// Impulse that the continuum has still to take from the relaxation (N s).
-    owed: Vec<[f64; 2]>,
+    joint: CellJoint<2, 1>,
     account: Account,
-    monitors: Monitors,
-    /// The window of slip and relaxation that is open.
-    windows: Windows,
-    /// Steps for which loads are held, how often until an exchange, and how often since the last one.
-    steps_of_loads: u64,
-    loads_of_exchange: u64,
-    made: u64,
-    exchanges: u64,
-    timestep: f64,
+    /// Σ over exchanges of the grains' mass in the full cells of the overlap, over that of the continuum in them.
+    packed: f64,
+    /// Labels renewed.
+    renewed: f64,
     sighting: Sighting,
     scratch: exchange::Scratch,
     outside: Outside,
@@ -272,7 +230,6 @@ impl MaterialEdge {
         simulation: &Simulation,
     ) -> Self {
         let cells = continuum.cells_along(spec.side);
-        let timestep = simulation.timestep();
         Self {
             cells,
             ours,
@@ -293,24 +250,14 @@ impl MaterialEdge {
                 ..View::default()
             },
             held: Held {
-                accelerations: vec![[0.0; 2]; cells.count()],
-                spins: vec![0.0; cells.count()],
                 rows: vec![Row::default(); cells.counts[1]],
                 reach: 0.0,
                 handshake: vec![spec.place + spec.settings.buffer; cells.counts[1]],
             },
-            laid: Given::nothing(cells.count()),
-            given: Given::nothing(cells.count()),
-            laid_at: simulation.steps_done(),
-            owed: vec![[0.0; 2]; cells.count()],
+            joint: CellJoint::new(cells.count(), cells.counts[1], &spec.settings, simulation),
             account: Account::default(),
-            monitors: Monitors::default(),
-            windows: Windows::new(2, [cells.count(), cells.counts[1]], &spec.settings),
-            steps_of_loads: spec.settings.steps_of_loads(timestep),
-            loads_of_exchange: spec.settings.loads_of_exchange(timestep),
-            made: 0,
-            exchanges: 0,
-            timestep,
+            packed: 0.0,
+            renewed: 0.0,
             sighting: Sighting::default(),
             scratch: exchange::Scratch::default(),
             outside: Outside::nothing(cells.count()),
@@ -359,55 +306,46 @@ impl MaterialEdge {
     /// Its share of the accounts since the start, with what the grains have been given since the last exchange.
     fn account(&self, simulation: &Simulation) -> Account {
         let mut account = self.account;
-        let time = self.acting(simulation);
-        for axis in 0..2 {
-            let relaxation: f64 = self.laid.relaxation.iter().map(|f| f[axis]).sum();
-            account.traction[axis] += self.given.traction[axis] + self.laid.traction[axis] * time;
-            account.impedance[axis] +=
-                self.given.impedance[axis] + self.laid.impedance[axis] * time;
-            account.relaxation[axis] += relaxation * time;
-        }
+        let [traction, impedance, relaxation] = self.joint.unbooked(simulation);
+        account.traction += traction;
+        account.impedance += impedance;
+        account.relaxation += relaxation;
         account
-    }
-
-    /// For how long what is laid has acted and is not booked yet (s).
-    fn acting(&self, simulation: &Simulation) -> f64 {
-        joint::acting(simulation, self.laid_at)
     }
 
     /// Momentum that the continuum has still to take from the relaxation (N s).
     pub fn owed(&self, simulation: &Simulation) -> [f64; 2] {
-        let time = self.acting(simulation);
-        let forces = self.laid.relaxation.iter().zip(&self.given.relaxation);
-        let all = self.owed.iter().zip(forces);
-        [0, 1].map(|axis| {
-            let of = all.clone();
-            of.map(|(owed, (laid, given))| owed[axis] - given[axis] - laid[axis] * time)
-                .sum()
-        })
+        self.joint.owed(simulation).into()
     }
 
     /// What the monitors have seen, with the window that is open.
     pub fn monitors(&self) -> Monitors {
-        Monitors {
-            windows: self.windows.closed(&self.monitors.windows),
-            ..self.monitors
-        }
+        self.joint.seen()
+    }
+
+    /// Mass of the grains in the overlap over that of the continuum there.
+    pub fn packing_ratio(&self) -> f64 {
+        self.packed / self.joint.monitors.exchanges.max(1.0)
+    }
+
+    /// Labels renewed.
+    pub fn renewed(&self) -> f64 {
+        self.renewed
     }
 
     /// Time between two exchanges (s).
     pub fn exchange_time(&self) -> f64 {
-        (self.loads_of_exchange * self.steps_of_loads) as f64 * self.timestep
+        self.joint.exchange_time()
     }
 
     /// Exchanges made.
     pub fn exchanges(&self) -> u64 {
-        self.exchanges
+        self.joint.exchanges
     }
 
     /// Whether an exchange has just been made.
     pub fn at_exchange(&self) -> bool {
-        self.made == 0
+        self.joint.made == 0
     }
 
     /// Momentum of the free grains as they are held, without what walls have taken: the same bits after a restart (N s).

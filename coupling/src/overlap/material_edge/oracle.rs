@@ -33,8 +33,7 @@ impl MaterialEdge {
     fn continuum_speed(&self, width: f64) -> f64 {
         let (mut sum, mut weight) = (0.0, 0.0);
         for cell in self.strip_behind(width) {
-            let [u, w] = self.view.velocity[cell];
-            sum += u * u + w * w;
+            sum += self.view.velocity[cell].norm_squared();
             weight += 1.0;
         }
         over(sum, weight).sqrt()

@@ -7,7 +7,7 @@ use colluvium_continuum::free_surface::Contact;
 use colluvium_continuum::rheology::MuI;
 use colluvium_continuum::terrain::Profile;
 use colluvium_dem::{ContactLaw, Domain, Grain, Hooke, Setup, TangentialSpring, Threads, Wall};
-use nalgebra::Vector3;
+use nalgebra::{Vector1, Vector2, Vector3};
 
 const LENGTH: f64 = 24.0;
 const HEIGHT: f64 = 10.0;
@@ -129,17 +129,16 @@ fn exchanged(edge: &MaterialEdge) -> [f64; 3] {
     let inside = 2..(HEIGHT as usize - 3);
     let accelerations = inside
         .clone()
-        .flat_map(|k| &edge.held.accelerations[k * columns..(k + 1) * columns]);
-    let accelerations = accelerations.flatten().map(|a| a.abs());
+        .flat_map(|k| &edge.joint.accelerations[k * columns..(k + 1) * columns]);
+    let accelerations = accelerations.map(|a| a.amax());
     let spins = inside
         .clone()
-        .flat_map(|k| &edge.held.spins[k * columns..(k + 1) * columns]);
-    let spins = spins.map(|a| a.abs()).fold(0.0, f64::max);
+        .flat_map(|k| &edge.joint.spins[k * columns..(k + 1) * columns]);
+    let spins = spins.map(|a| a.amax()).fold(0.0, f64::max);
     let forces = inside.map(|k| {
-        let load = &edge.scratch.shell[k];
-        let slip = load.slip.map(|p| joint::over(p, load.weight));
-        let force = edge.held.rows[k].impedance(edge.spec.settings.impedance, slip);
-        force[0].hypot(force[1])
+        let row = &edge.held.rows[k];
+        let slip = edge.scratch.shell[k].slip();
+        row.impedance(edge.spec.settings.impedance, slip).norm()
     });
     [
         accelerations.fold(0.0, f64::max),
@@ -180,14 +179,14 @@ fn a_couple_is_answered_by_forces_of_its_moment() {
     let (mut zone, _) = joined(0.0, [0.0; 2], 0.0);
     let edge = &mut zone.edges[0];
     let columns = edge.cells.counts[0];
-    edge.owed.fill([0.0; 2]);
-    edge.given.spin.fill(0.0);
-    edge.given.spin[7 + 4 * columns] = 0.3;
+    edge.joint.owed.fill(Vector2::zeros());
+    edge.joint.given.spin.fill(Vector1::zeros());
+    edge.joint.given.spin[7 + 4 * columns] = Vector1::new(0.3);
     // On the floor there is nothing to take one.
-    edge.given.spin[7] = 0.3;
+    edge.joint.given.spin[7] = Vector1::new(0.3);
     edge.answer_couples();
     let (mut force, mut moment) = ([0.0; 2], 0.0);
-    for (cell, owed) in edge.owed.iter().enumerate() {
+    for (cell, owed) in edge.joint.owed.iter().enumerate() {
         let at = [
             edge.cells.centre(cell % columns),
             edge.cells.height(cell / columns),

@@ -6,7 +6,9 @@
 //! u at each one's place: what moves and turns as one feels none of it.
 
 use super::cells::Cells;
+use crate::overlap::cell_joint::Shell;
 use crate::overlap::joint::over;
+use nalgebra::Vector2;
 
 /// What a row of the edge is pressed with until the next exchange.
 #[derive(Clone, Copy, Debug, Default, PartialEq)]
@@ -14,11 +16,11 @@ pub struct Row {
     /// Where the edge is (m).
     pub place: f64,
     /// Its area vector along x and z (m²).
-    pub area: [f64; 2],
+    pub area: Vector2<f64>,
     /// Force of the continuum (N).
-    pub traction: [f64; 2],
+    pub traction: Vector2<f64>,
     /// Velocity of the continuum there (m/s).
-    pub velocity: [f64; 2],
+    pub velocity: Vector2<f64>,
 }
 
 /// Numbers of a row.
@@ -27,45 +29,33 @@ pub const NUMBERS: usize = 7;
 impl Row {
     /// All of it in a row of numbers.
     pub fn numbers(&self) -> [f64; NUMBERS] {
-        let ([ax, az], [tx, tz], [ux, uz]) = (self.area, self.traction, self.velocity);
-        [self.place, ax, az, tx, tz, ux, uz]
+        let [a, t, u] = [self.area, self.traction, self.velocity];
+        [self.place, a[0], a[1], t[0], t[1], u[0], u[1]]
     }
 
     /// From such numbers.
     pub fn of(n: &[f64; NUMBERS]) -> Self {
         Self {
             place: n[0],
-            area: [n[1], n[2]],
-            traction: [n[3], n[4]],
-            velocity: [n[5], n[6]],
+            area: Vector2::new(n[1], n[2]),
+            traction: Vector2::new(n[3], n[4]),
+            velocity: Vector2::new(n[5], n[6]),
         }
     }
 
     /// Force of an impedance on grains that move so much faster than the continuum (N).
-    pub fn impedance(&self, impedance: f64, slip: [f64; 2]) -> [f64; 2] {
+    pub fn impedance(&self, impedance: f64, slip: Vector2<f64>) -> Vector2<f64> {
         let size = self.area[0].hypot(self.area[1]);
         if size <= 0.0 {
-            return [0.0; 2];
+            return Vector2::zeros();
         }
-        let n = self.area.map(|a| a / size);
-        let through = slip[0] * n[0] + slip[1] * n[1];
-        n.map(|n| -impedance * size * through * n)
+        let n = self.area / size;
+        -impedance * size * slip.dot(&n) * n
     }
 }
 
-/// The shell's weight in each row, and its slip.
-#[derive(Clone, Copy, Debug, Default, PartialEq)]
-pub struct Load {
-    /// Σ q h (kg).
-    pub weight: f64,
-    /// Σ q h (v − u), u the continuum's velocity at the grain (N s).
-    pub slip: [f64; 2],
-    /// Σ q h v (N s).
-    pub momentum: [f64; 2],
-}
-
 /// For each row the one whose grains bear what presses on it: itself, or the next below with grains, or above.
-pub fn bearers(loads: &[Load], least: f64, into: &mut Vec<usize>) {
+pub fn bearers(loads: &[Shell<2>], least: f64, into: &mut Vec<usize>) {
     into.clear();
     let borne = |k: &usize| loads[*k].weight > least;
     let first = (0..loads.len()).find(borne);
@@ -121,15 +111,16 @@ mod tests {
 
     #[test]
     fn rows_without_grains_are_borne_by_the_next_below() {
-        let load = |weight| Load {
-            weight,
-            ..Load::default()
+        let load = |weight| {
+            let mut shell = Shell::NONE;
+            shell.weight = weight;
+            shell
         };
         let loads = [0.0, 2.0, 0.0, 1.0, 0.0].map(load);
         let mut found = Vec::new();
         bearers(&loads, 0.1, &mut found);
         assert_eq!(found, [1, 1, 1, 3, 3]);
-        bearers(&[Load::default(); 2], 0.1, &mut found);
+        bearers(&[Shell::NONE; 2], 0.1, &mut found);
         assert_eq!(found, [usize::MAX; 2]);
     }
 
@@ -155,13 +146,13 @@ mod tests {
     #[test]
     fn an_impedance_resists_what_comes_near_and_nothing_along() {
         let row = Row {
-            area: [-3.0, 4.0],
-            velocity: [1.0, 1.0],
+            area: Vector2::new(-3.0, 4.0),
+            velocity: Vector2::new(1.0, 1.0),
             ..Row::default()
         };
-        let along = row.impedance(2.0, [4.0, 3.0]);
+        let along = row.impedance(2.0, Vector2::new(4.0, 3.0));
         assert!(along.iter().all(|f| f.abs() < 1e-13), "{along:?}");
-        let against = row.impedance(2.0, [-0.6, 0.8]);
+        let against = row.impedance(2.0, Vector2::new(-0.6, 0.8));
         // Z |A| times a speed of one along (-0.6, 0.8), the other way.
         assert!((against[0] - 6.0).abs() < 1e-12 && (against[1] + 8.0).abs() < 1e-12);
         assert_eq!(Row::of(&row.numbers()), row);

@@ -5,7 +5,7 @@
 //! where they are laid, and nothing between knows of sides. So a mirrored scene gives mirrored loads, to the bit.
 
 use colluvium_dem::{ContactSample, GrainSample};
-use nalgebra::Vector3;
+use nalgebra::{Vector2, Vector3};
 
 /// Where the continuum of an edge lies, seen from the grains.
 #[derive(Clone, Copy, Debug, Default, PartialEq, Eq)]
@@ -76,6 +76,11 @@ impl Side {
             ..contact
         }
     }
+}
+
+/// A vector of the plane x–z in space.
+pub(super) fn in_slab(v: Vector2<f64>) -> Vector3<f64> {
+    Vector3::new(v[0], 0.0, v[1])
 }
 
 /// Turns the order of the numbers of each row of so many.

@@ -95,7 +95,7 @@ impl Continuum {
             let [begin, end] = counted[cell / columns];
             place >= begin && place < end
         });
-        let twice: f64 = counted.map(|(_, ([u, w], f))| f * (u * u + w * w)).sum();
+        let twice: f64 = counted.map(|(_, (u, f))| f * u.norm_squared()).sum();
         0.5 * self.spec.density() * self.cells.volume() * twice
     }
 

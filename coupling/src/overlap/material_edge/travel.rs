@@ -246,7 +246,8 @@ impl MaterialEdge {
             for grain in strip.grains.iter_mut().filter(|g| !g.fixed) {
                 let at = side.along(grain.position.x);
                 let hats = self.cells.hats(at, grain.position.z);
-                let [u, w] = side.in_plane(self.view.velocity_at(&hats).unwrap_or([0.0; 2]));
+                let velocity = self.view.velocity_at(&hats).unwrap_or_default();
+                let [u, w] = side.in_plane(velocity.into());
                 grain.position += dt * Vector3::new(u, 0.0, w);
                 grain.velocity = Vector3::new(u, 0.0, w);
             }

@@ -2,13 +2,10 @@
 
 use super::cells::Cells;
 use super::side::{Side, mirror_rows};
+use crate::overlap::joint::{self, FULL, surface_factor};
 use crate::overlap::rest_stress::RestStress;
 use colluvium_continuum::column_collapse::Collapse;
-
-/// Cells fuller than this have a pressure of their own.
-const FULL: f64 = 0.5;
-/// Most by which the pressure of a cell at the surface is taken to be below the mean over its filled part.
-const LARGEST_FACTOR: f64 = 2.0;
+use nalgebra::Vector2;
 
 /// Fields of all cells (SI).
 #[derive(Clone, Debug, Default)]
@@ -16,7 +13,7 @@ pub struct View {
     /// Filled part.
     pub fraction: Vec<f64>,
     /// Velocity along x and z (m/s).
-    pub velocity: Vec<[f64; 2]>,
+    pub velocity: Vec<Vector2<f64>>,
     /// Pressure (Pa); negative where a cell has none.
     pub pressure: Vec<f64>,
     /// ((σ_xx − σ_zz)/2, σ_xz), positive in tension (Pa).
@@ -42,7 +39,7 @@ impl View {
             let across = state.velocity[0][low] + state.velocity[0][low + 1];
             let up = state.velocity[1][cell] + state.velocity[1][cell + columns];
             self.velocity
-                .push([across, up].map(|sum| 0.5 * sum * units.velocity));
+                .push(Vector2::new(across, up).map(|sum| 0.5 * sum * units.velocity));
             let own = collapse.flow().stresses_in(cell);
             let mean = |c: usize| own.iter().map(|s| s[c]).sum::<f64>() / own.len() as f64;
             self.stress.push([0, 1].map(|c| mean(c) * stress));
@@ -53,7 +50,7 @@ impl View {
             mirror_rows(&mut self.velocity, columns);
             mirror_rows(&mut self.stress, columns);
             for (u, stress) in self.velocity.iter_mut().zip(&mut self.stress) {
-                *u = as_seen.in_plane(*u);
+                *u = as_seen.in_plane((*u).into()).into();
                 *stress = as_seen.stress(*stress);
             }
         }
@@ -107,15 +104,8 @@ impl View {
     }
 
     /// Velocity at a place from the full cells around it; none without any.
-    pub fn velocity_at(&self, hats: &[(usize, f64); 4]) -> Option<[f64; 2]> {
-        let (mut sum, mut weight) = ([0.0; 2], 0.0);
-        for &(cell, hat) in hats.iter().filter(|(cell, _)| self.is_full(*cell)) {
-            weight += hat;
-            for (sum, u) in sum.iter_mut().zip(self.velocity[cell]) {
-                *sum += hat * u;
-            }
-        }
-        (weight > 0.0).then(|| sum.map(|s| s / weight))
+    pub fn velocity_at(&self, hats: &[(usize, f64); 4]) -> Option<Vector2<f64>> {
+        joint::velocity_at(hats, |cell| self.is_full(cell), &self.velocity)
     }
 
     /// σ_xx with what is remembered, σ_zz, σ_xz (Pa) of a cell, for so many times its pressure.
@@ -127,15 +117,17 @@ impl View {
 
     /// Filled part, σ_xx with what is remembered, σ_zz, σ_xz (Pa) and velocity at a place in a row, from the cells beside it;
     /// none where neither is full.
-    pub fn across(&self, cells: &Cells, x: f64, row: usize) -> Option<(f64, [f64; 3], [f64; 2])> {
+    pub fn across(
+        &self,
+        cells: &Cells,
+        x: f64,
+        row: usize,
+    ) -> Option<(f64, [f64; 3], Vector2<f64>)> {
         let columns = cells.counts[0];
-        let place = cells.offset(x);
-        let low = place.floor();
-        let share = place - low;
-        let index = |n: i64| (low as i64 + n).clamp(0, columns as i64 - 1) as usize + columns * row;
         let (mut weight, mut fraction) = (0.0, 0.0);
-        let (mut sigma, mut velocity) = ([0.0; 3], [0.0; 2]);
-        for (cell, hat) in [(index(0), 1.0 - share), (index(1), share)] {
+        let (mut sigma, mut velocity) = ([0.0; 3], Vector2::zeros());
+        for (column, hat) in cells.columns(x) {
+            let cell = column + columns * row;
             if !self.is_full(cell) {
                 continue;
             }
@@ -144,17 +136,14 @@ impl View {
             fraction += hat * f;
             let above = cell + columns;
             let at_surface = above >= cells.count() || !self.is_full(above);
-            // Linear from the centre to the surface, over the filled part.
             let factor = match at_surface {
-                true => (f / (2.0 * f - 1.0)).min(LARGEST_FACTOR),
+                true => surface_factor(f),
                 false => 1.0,
             };
             for (sum, part) in sigma.iter_mut().zip(self.stress_of_grains(cell, factor)) {
                 *sum += hat * part;
             }
-            for (sum, u) in velocity.iter_mut().zip(self.velocity[cell]) {
-                *sum += hat * u;
-            }
+            velocity += hat * self.velocity[cell];
         }
         let mean = |sum: f64| sum / weight;
         (weight > 0.0).then(|| (mean(fraction), sigma.map(mean), velocity.map(mean)))

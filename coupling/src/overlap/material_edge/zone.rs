@@ -11,9 +11,11 @@ use super::{
     Account, Continuum, MaterialEdge, MaterialEdgeSpec, OverlapError, Side, floor, layout, start,
 };
 use crate::overlap::angular::AngularBook;
+use crate::overlap::joint::along_axes;
 use crate::overlap::sighting::{Sighting, free_mass};
 use colluvium_continuum::column_collapse::CollapseGround;
 use colluvium_dem::{Load, Simulation};
+use nalgebra::Vector2;
 
 /// Diameters of grains between two overlaps that moves leave.
 const BETWEEN: f64 = 4.0;
@@ -86,14 +88,15 @@ impl GrainZone {
             edge.cut_off(simulation);
         }
         zone.weigh(simulation);
-        zone.own.grains_before = zone.grain_momentum(simulation);
+        zone.own.grains_before = zone.grain_momentum(simulation).into();
         for edge in &mut zone.edges {
             edge.look(simulation);
         }
         for continuum in &mut zone.continua {
             let edges = &mut zone.edges[continuum.edges.clone()];
             if let Some(keeper) = edges.get_mut(continuum.keeper) {
-                keeper.account.continuum_before = keeper.spec.side.in_plane(continuum.momentum());
+                let momentum = keeper.spec.side.in_plane(continuum.momentum());
+                keeper.account.continuum_before = momentum.into();
             }
             continuum.prime(edges)?;
             for edge in edges {
@@ -140,17 +143,13 @@ impl GrainZone {
         let Some(edge) = self.edges.first() else {
             return;
         };
-        self.grain_steps += simulation.grain_count() as f64 * edge.steps_of_loads as f64;
-        let weight = self.weight(edge.acting(simulation), simulation);
-        for (sum, weight) in self.own.weight.iter_mut().zip(weight) {
-            *sum += weight;
-        }
+        self.grain_steps += simulation.grain_count() as f64 * edge.joint.steps_of_loads as f64;
+        self.own.weight += self.weight(edge.joint.acting(simulation), simulation);
     }
 
     /// Impulse of the grains' weight in a time (N s).
-    fn weight(&self, time: f64, simulation: &Simulation) -> [f64; 2] {
-        let gravity = simulation.gravity();
-        [gravity.x, gravity.z].map(|g| self.grain_mass * g * time)
+    fn weight(&self, time: f64, simulation: &Simulation) -> Vector2<f64> {
+        along_axes(&simulation.gravity()) * self.grain_mass * time
     }
 
     pub(super) fn weigh(&mut self, simulation: &Simulation) {
@@ -245,10 +244,7 @@ impl GrainZone {
             all.add(&edge.account(simulation), edge.spec.side);
         }
         if let Some(edge) = self.edges.first() {
-            let weight = self.weight(edge.acting(simulation), simulation);
-            for (sum, weight) in all.weight.iter_mut().zip(weight) {
-                *sum += weight;
-            }
+            all.weight += self.weight(edge.joint.acting(simulation), simulation);
         }
         all
     }

@@ -318,7 +318,7 @@ impl JoinedColumn<'_> {
             summary.put(name, Quantity::new(value, "1").against(0.0, source));
         }
         let walls = account.from_walls_and_surface(zone.continuum_momentum());
-        for (name, [x, z], source) in [
+        for (name, impulse, source) in [
             ("weight", account.weight, "of the grains"),
             (
                 "traction",
@@ -347,7 +347,7 @@ impl JoinedColumn<'_> {
                 "that the continuum had from walls, floor or ground and the stress on its surface: what is left of its momentum",
             ),
         ] {
-            for (axis, value) in [("x", x), ("z", z)] {
+            for (axis, value) in [("x", impulse[0]), ("z", impulse[1])] {
                 let name = format!("impulse_{name}_{axis}");
                 summary.put(&name, Quantity::new(value, "N s").from(source));
             }
@@ -389,7 +389,7 @@ impl JoinedColumn<'_> {
             ),
             (
                 "overlap_packing",
-                monitors.packing_ratio(),
+                edge.packing_ratio(),
                 1.0,
                 "mass of the grains in full cells of the overlap over that of the continuum there",
             ),
@@ -451,7 +451,7 @@ impl JoinedColumn<'_> {
             ),
             (
                 "labels_renewed",
-                monitors.renewed,
+                edge.renewed(),
                 "of grains that had left their neighbours in the overlap",
             ),
         ] {

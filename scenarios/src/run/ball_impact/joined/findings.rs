@@ -16,7 +16,7 @@ impl JoinedBed<'_> {
         let before = ran.packing.grains.len() + 1;
         let monitors = bowl.monitors();
         let counted = summary.cost.grain_steps.min(steps * before as u64);
-        summary.cost.grain_steps += monitors.grain_steps as u64;
+        summary.cost.grain_steps += bowl.grain_steps() as u64;
         summary.cost.grain_steps -= counted;
         summary.cost.cell_steps = monitors.steps[1] as u64;
         if summary.cost.wall_s > 0.0 {
@@ -26,7 +26,7 @@ impl JoinedBed<'_> {
         summary.model.grains = ran.simulation.grain_count() as u64;
         summary.model.cells = bowl.cells().count() as u64;
         let one = |value: f64| Quantity::new(value, "1");
-        let share = monitors.grain_steps / (steps * before as u64) as f64;
+        let share = bowl.grain_steps() / (steps * before as u64) as f64;
         summary.put(
             "grain_steps_share",
             one(share).from("grain-steps of the run over those of the whole bed"),
@@ -148,7 +148,7 @@ impl JoinedBed<'_> {
         overlap_state::put(monitors.temperatures(), monitors.work, summary);
         summary.put(
             "newton_iterations",
-            Quantity::new(monitors.iterations / monitors.steps[0], "1")
+            Quantity::new(monitors.newton[0] / monitors.steps[0], "1")
                 .from("of the continuum, a step"),
         );
         summary.put(
