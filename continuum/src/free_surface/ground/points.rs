@@ -215,25 +215,30 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             return None;
         }
         let side = sides_of::<D>(corner);
-        [0].into_iter().chain((0..D).map(|axis| 1 << axis)).find_map(|way| {
-            let (below, corner) = (around[way], corner ^ way);
-            if below == NONE || ground.free[below] == 0.0 {
-                return None;
-            }
-            let wall = ground.wall[below];
-            let axis = (0..D).rev().find(|&axis| wall.iter().all(|n| n.abs() <= wall[axis].abs()))?;
-            // The corner lies on the side of the cell that is away from the ground.
-            let away = usize::from(wall[axis] > 0.0);
-            if wall[axis] == 0.0 || corner >> axis & 1 != away || (way != 0 && way != 1 << axis) {
-                return None;
-            }
-            let has_own = |component: usize| {
-                let face = self.topology.cell_faces[below][component][side[component]];
-                face != NONE && ground.open[component][face]
-            };
-            let is_held = (0..D).all(|component| component == axis || !has_own(component));
-            is_held.then_some((below, corner))
-        })
+        [0].into_iter()
+            .chain((0..D).map(|axis| 1 << axis))
+            .find_map(|way| {
+                let (below, corner) = (around[way], corner ^ way);
+                if below == NONE || ground.free[below] == 0.0 {
+                    return None;
+                }
+                let wall = ground.wall[below];
+                let axis = (0..D)
+                    .rev()
+                    .find(|&axis| wall.iter().all(|n| n.abs() <= wall[axis].abs()))?;
+                // The corner lies on the side of the cell that is away from the ground.
+                let away = usize::from(wall[axis] > 0.0);
+                if wall[axis] == 0.0 || corner >> axis & 1 != away || (way != 0 && way != 1 << axis)
+                {
+                    return None;
+                }
+                let has_own = |component: usize| {
+                    let face = self.topology.cell_faces[below][component][side[component]];
+                    face != NONE && ground.open[component][face]
+                };
+                let is_held = (0..D).all(|component| component == axis || !has_own(component));
+                is_held.then_some((below, corner))
+            })
     }
 
     /// At a corner on the ground the traction acts on all of the ground's surface, however thin the
