@@ -206,7 +206,12 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         step: f64,
     ) -> bool {
         let spacing = |axis: usize| self.grid.axes()[axis].spacing();
-        let wall = ground.wall[cell];
+        let below = self.topology.cell_neighbours[cell][axis][0];
+        // A layer that crosses rows of cells lies on the ground in the one below.
+        let wall = match ground.wall[cell] {
+            wall if wall == [0.0; D] && below != NONE => ground.wall[below],
+            wall => wall,
+        };
         let here = -wall[along] * spacing(along) / (wall[axis] * spacing(axis));
         rise * step.signum() > EMPTY && (here - rise).abs() <= EVEN * rise.abs()
     }
