@@ -11,6 +11,8 @@ use crate::strain::{shear_row, stretching};
 
 /// Ground whose normal has less than this of another axis lies along one.
 const ALONG_AXIS: f64 = 1e-9;
+/// Matter in a plane is shallow if it has no pressure so many cells above the ground.
+const SHALLOW: usize = 5;
 /// Part of the stretching of a cell in the middle of a part of it on ground along an axis.
 const STRETCHING_ON_GROUND: f64 = 0.5;
 
@@ -204,14 +206,15 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
     }
 
     /// The cell cut by ground below a corner, and which of its corners that is, if no face beside the corner has an unknown
-    /// there: what is sheared at the corner is sheared against the ground, and bears its pressure, not that of the corner.
+    /// there: what is sheared at the corner is sheared against the ground, and bears its pressure, not that of the corner. Where
+    /// matter is deep the pressure of the corner is of higher order.
     fn held_by_ground(
         &self,
         ground: &Ground<D>,
         corner: usize,
         around: &Around,
     ) -> Option<(usize, usize)> {
-        if ground.contact.slides() {
+        if D > 2 || ground.contact.slides() {
             return None;
         }
         let side = sides_of::<D>(corner);
@@ -237,7 +240,15 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                     face != NONE && ground.open[component][face]
                 };
                 let is_held = (0..D).all(|component| component == axis || !has_own(component));
-                is_held.then_some((below, corner))
+                let is_deep = || {
+                    let up = |at: usize| match at {
+                        NONE => NONE,
+                        at => self.topology.cell_neighbours[at][axis][away],
+                    };
+                    let top = (0..SHALLOW).fold(below, |at, _| up(at));
+                    top != NONE && self.faces.pressure[top] != NONE
+                };
+                (is_held && !is_deep()).then_some((below, corner))
             })
     }
 
