@@ -59,7 +59,7 @@ pub(crate) fn faces_over<const D: usize>(
     }
     let none = || std::array::from_fn(|_| Vec::new());
     let mut shares = faces.shares.replace(none()).unwrap_or_else(none);
-    let (mut lying, mut layers) = (Vec::new(), Vec::new());
+    let mut lying = Vec::new();
     for (j, &(component, face)) in faces.own.iter().enumerate() {
         if !faces.is_thin[j] {
             shares[component][face] = ground.swell(component, face);
@@ -89,11 +89,6 @@ pub(crate) fn faces_over<const D: usize>(
                         && lies_on_something(&faces, ground, topology, fractions, component, face)
                     {
                         lying.push((component, face));
-                    } else if thin_layer == ThinLayer::DepthAveraged
-                        && let Some(base) =
-                            layer_on_ground(&faces, ground, topology, fractions, component, face)
-                    {
-                        layers.push((component, face, base));
                     }
                 }
                 Waiting::Layer => {
@@ -111,17 +106,6 @@ pub(crate) fn faces_over<const D: usize>(
     }
     for own in lying {
         faces.role[own.0][own.1] = faces.take(own.0, own.1, false, NONE);
-    }
-    for (component, face, base) in layers {
-        faces.role[component][face] = faces.take(component, face, true, NONE);
-        if let (Some(j), Face::Still) = (
-            faces.role[component][face].unknown(),
-            faces.role[component][base],
-        ) && ground.aperture[component][base] > 0.0
-        {
-            faces.role[component][base] = Face::Follows(j);
-            shares[component][base] = [1.0; D];
-        }
     }
     faces.shares = Some(shares);
     faces.land(topology, fractions);
@@ -147,25 +131,6 @@ fn lies_on_something<const D: usize>(
                 && below != NONE
                 && (ground.solid[below] > 0.0 || faces.pressure[ground.master[below]] != NONE)
         })
-}
-
-/// The face below one that would fly, if what is there lies on ground that cuts the cells below and leaves that face no
-/// unknown: a thin layer that crosses rows of cells.
-fn layer_on_ground<const D: usize>(
-    faces: &Faces<D>,
-    ground: &Ground<D>,
-    topology: &Topology<D>,
-    fractions: &[f64],
-    component: usize,
-    face: usize,
-) -> Option<usize> {
-    let base = ground.shut_below(topology, component, face)?;
-    let is_layer = ground.open[component][face]
-        && topology.face_mean(component, face, fractions) >= THINNEST_LAYER
-        && topology.face_cells[component][face].iter().all(|&cell| {
-            faces.pressure[ground.master[cell]] == NONE && ground.wall[cell] == [0.0; D]
-        });
-    is_layer.then_some(base)
 }
 
 fn own_role<const D: usize>(

@@ -78,11 +78,7 @@ impl<const D: usize> Ground<D> {
         component: usize,
         face: usize,
     ) -> Option<Slope<D>> {
-        let mut normal = unit(self.normal_at(topology, component, face));
-        if normal == [0.0; D] {
-            let base = self.shut_below(topology, component, face)?;
-            normal = unit(self.normal_at(topology, component, base));
-        }
+        let normal = unit(self.normal_at(topology, component, face));
         let axis = (0..D).rev().reduce(|most, axis| {
             if normal[axis].abs() > normal[most].abs() {
                 axis
@@ -103,23 +99,6 @@ impl<const D: usize> Ground<D> {
             press: weight_onto(&acceleration, axis, usize::from(is_above)),
             weight: towards.max(0.0) / normal[axis].abs(),
         })
-    }
-
-    /// The face below one whose cells ground does not touch, if ground cuts that one's cells and leaves it no unknown: a layer
-    /// that fills them lies on the ground with what is above.
-    pub(super) fn shut_below(
-        &self,
-        topology: &Topology<D>,
-        component: usize,
-        face: usize,
-    ) -> Option<usize> {
-        let last = D - 1;
-        let base = topology.face_neighbours[component][face][last][0];
-        if D > 2 || component == last || base == NONE || self.open[component][base] {
-            return None;
-        }
-        let normal = self.normal_at(topology, component, base);
-        (normal[last] > 0.0 && normal.iter().all(|n| n.abs() <= normal[last])).then_some(base)
     }
 
     /// Thickness of material and of material and ground together along an axis, in cells, at a cell:
@@ -206,12 +185,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
         step: f64,
     ) -> bool {
         let spacing = |axis: usize| self.grid.axes()[axis].spacing();
-        let below = self.topology.cell_neighbours[cell][axis][0];
-        // A layer that crosses rows of cells lies on the ground in the one below.
-        let wall = match ground.wall[cell] {
-            wall if wall == [0.0; D] && below != NONE => ground.wall[below],
-            wall => wall,
-        };
+        let wall = ground.wall[cell];
         let here = -wall[along] * spacing(along) / (wall[axis] * spacing(axis));
         rise * step.signum() > EMPTY && (here - rise).abs() <= EVEN * rise.abs()
     }

@@ -11,8 +11,6 @@ use crate::strain::{shear_row, stretching};
 
 /// Ground whose normal has less than this of another axis lies along one.
 const ALONG_AXIS: f64 = 1e-9;
-/// Matter in a plane is shallow if it has no pressure so many cells above the ground.
-const SHALLOW: usize = 5;
 /// Part of the stretching of a cell in the middle of a part of it on ground along an axis.
 const STRETCHING_ON_GROUND: f64 = 0.5;
 
@@ -141,17 +139,8 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 layer.scale(&mut point);
                 point.pressure_offset = layer.pressure;
             } else {
-                let pressure = match self.held_by_ground(ground, corner, &around) {
-                    Some((below, corner)) => {
-                        let around = self.mirrored(self.cells_around(below, sides_of::<D>(corner)));
-                        let press = Some(self.press_on_ground(ground, below, None));
-                        self.pressure_at_corner(ground, corner, &around, press)
-                    }
-                    None => {
-                        let press = on_ground.map(|_| self.press_on_ground(ground, cell, axis));
-                        self.pressure_at_corner(ground, corner, &mirrored, press)
-                    }
-                };
+                let press = on_ground.map(|_| self.press_on_ground(ground, cell, axis));
+                let pressure = self.pressure_at_corner(ground, corner, &mirrored, press);
                 for &(p, factor) in pressure.terms() {
                     point.add_pressure(p, factor);
                 }
@@ -203,53 +192,6 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             }
         }
         around
-    }
-
-    /// The cell cut by ground below a corner, and which of its corners that is, if no face beside the corner has an unknown
-    /// there: what is sheared at the corner is sheared against the ground, and bears its pressure, not that of the corner. Where
-    /// matter is deep the pressure of the corner is of higher order.
-    fn held_by_ground(
-        &self,
-        ground: &Ground<D>,
-        corner: usize,
-        around: &Around,
-    ) -> Option<(usize, usize)> {
-        if D > 2 || ground.contact.slides() {
-            return None;
-        }
-        let side = sides_of::<D>(corner);
-        [0].into_iter()
-            .chain((0..D).map(|axis| 1 << axis))
-            .find_map(|way| {
-                let (below, corner) = (around[way], corner ^ way);
-                if below == NONE || ground.free[below] == 0.0 {
-                    return None;
-                }
-                let wall = ground.wall[below];
-                let axis = (0..D)
-                    .rev()
-                    .find(|&axis| wall.iter().all(|n| n.abs() <= wall[axis].abs()))?;
-                // The corner lies on the side of the cell that is away from the ground.
-                let away = usize::from(wall[axis] > 0.0);
-                if wall[axis] == 0.0 || corner >> axis & 1 != away || (way != 0 && way != 1 << axis)
-                {
-                    return None;
-                }
-                let has_own = |component: usize| {
-                    let face = self.topology.cell_faces[below][component][side[component]];
-                    face != NONE && ground.open[component][face]
-                };
-                let is_held = (0..D).all(|component| component == axis || !has_own(component));
-                let is_deep = || {
-                    let up = |at: usize| match at {
-                        NONE => NONE,
-                        at => self.topology.cell_neighbours[at][axis][away],
-                    };
-                    let top = (0..SHALLOW).fold(below, |at, _| up(at));
-                    top != NONE && self.faces.pressure[top] != NONE
-                };
-                (is_held && !is_deep()).then_some((below, corner))
-            })
     }
 
     /// At a corner on the ground the traction acts on all of the ground's surface, however thin the
