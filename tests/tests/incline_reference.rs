@@ -13,9 +13,15 @@ fn moderate_bed() -> &'static Bed {
     BED.get_or_init(|| bed(material(Some(0.2)), 1700, [12.0, 6.0], 11).unwrap())
 }
 
-fn run(slope: f64, start: Start, purpose: Purpose, times: [f64; 2]) -> InclineResult {
+/// 800 of them, 8 × 6 d: whether a bed rests or flows needs no profile.
+fn small_bed() -> &'static Bed {
+    static BED: OnceLock<Bed> = OnceLock::new();
+    BED.get_or_init(|| bed(material(Some(0.2)), 800, [8.0, 6.0], 11).unwrap())
+}
+
+fn run(bed: &Bed, slope: f64, start: Start, purpose: Purpose, times: [f64; 2]) -> InclineResult {
     let law = material(Some(0.2));
-    let spec = incline(law, moderate_bed(), slope, start, purpose, times);
+    let spec = incline(law, bed, slope, start, purpose, times);
     let mut run = InclineRun::new(spec).unwrap();
     while !run.finished() {
         run.advance(10_000).unwrap();
@@ -50,7 +56,7 @@ fn flow_at_33_degrees_agrees_with_lammps_and_carries_its_weight() {
     let start = Start::Flow {
         inertial_number: 0.25,
     };
-    let result = run(33.0, start, Purpose::Measure, [50.0, 60.0]);
+    let result = run(moderate_bed(), 33.0, start, Purpose::Measure, [50.0, 60.0]);
     assert!(result.flows());
     let [mu, mu_zz, phi, mean] = deviation(&result.points);
     println!(
@@ -112,7 +118,13 @@ fn in_a_steady_flow_the_stress_ratio_is_the_slope_s_in_every_layer() {
     let start = Start::Flow {
         inertial_number: 0.2,
     };
-    let result = run(30.0, start, Purpose::Measure, [300.0, 200.0]);
+    let result = run(
+        moderate_bed(),
+        30.0,
+        start,
+        Purpose::Measure,
+        [300.0, 200.0],
+    );
     let tangent = 30_f64.to_radians().tan();
     let off = stress_ratio(&result, |_| tangent);
     let asked = stress_ratio(&result, |row| row.mu_zz_balance.unwrap());
@@ -154,11 +166,23 @@ fn rests_at_24_degrees_and_flows_at_33() {
     let gentle = Start::Flow {
         inertial_number: 0.06,
     };
-    let rest = run(24.0, gentle, Purpose::StopSearch, [20.0, 120.0]);
+    let rest = run(
+        small_bed(),
+        24.0,
+        gentle,
+        Purpose::StopSearch,
+        [20.0, 120.0],
+    );
     assert_eq!(rest.outcome, Outcome::Rest, "{:?}", rest.steady);
     assert!(!rest.flows());
-    let flow = run(33.0, gentle, Purpose::StopSearch, [20.0, 30.0]);
+    let flow = run(small_bed(), 33.0, gentle, Purpose::StopSearch, [20.0, 30.0]);
     assert!(flow.flows(), "{:?} {:?}", flow.outcome, flow.steady);
-    let still = run(24.0, Start::Rest, Purpose::OnsetSearch, [20.0, 20.0]);
+    let still = run(
+        small_bed(),
+        24.0,
+        Start::Rest,
+        Purpose::OnsetSearch,
+        [20.0, 20.0],
+    );
     assert!(!still.flows(), "{:?} {:?}", still.outcome, still.steady);
 }
