@@ -30,7 +30,6 @@ mod packings;
 mod prepared_beds;
 mod read_scenes;
 mod recipes;
-mod render;
 mod restart;
 mod safety;
 mod scenes;

@@ -1,5 +1,7 @@
 //! Pictures and animations of series.
 
+#![allow(clippy::unwrap_used)] // a test may panic
+
 use colluvium::failure::Failure;
 use colluvium::render::{FOLDER, Request, remove, render};
 use colluvium::report;
