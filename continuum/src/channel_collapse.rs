@@ -171,7 +171,7 @@ impl ChannelCollapse {
     /// units.
     ///
     /// # Errors
-    /// [`Error::NotConverged`].
+    /// [`Error::OutOfRange`] for a time that is not after the flow's; [`Error::NotConverged`].
     pub fn step(&mut self, until: f64) -> Result<SurfaceStep, Error> {
         self.flow
             .step(until / self.units.time() - self.flow.state().time)

@@ -417,7 +417,7 @@ impl<L: ShearLaw + Clone> Collapse<L> {
     /// units.
     ///
     /// # Errors
-    /// [`Error::NotConverged`].
+    /// [`Error::OutOfRange`] for a time that is not after the flow's; [`Error::NotConverged`].
     pub fn step(&mut self, until: f64) -> Result<SurfaceStep, Error> {
         self.flow
             .step(until / self.units.time() - self.flow.state().time)

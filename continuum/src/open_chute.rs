@@ -275,7 +275,7 @@ impl<L: ShearLaw + Clone, const D: usize, const C: usize, const V: usize> OpenCh
     /// Makes one step that ends at time `until` (s) at the latest; what it reports is in natural units.
     ///
     /// # Errors
-    /// [`Error::NotConverged`].
+    /// [`Error::OutOfRange`] for a time that is not after the flow's; [`Error::NotConverged`].
     pub fn step(&mut self, until: f64) -> Result<SurfaceStep, Error> {
         self.flow
             .step(until / self.units.time() - self.flow.state().time)

@@ -207,8 +207,15 @@ fn rasters_end_at_their_edges() {
     assert!(beyond(1.1).is_err());
     let surface = raster.surface().unwrap();
     // The same line from its triangles, its edges included.
-    for y in [1.0, 1.5, 2.0] {
+    for y in [1.0, 1.0 - 1e-12, 1.5, 2.0, 2.0 + 1e-12] {
         let [of_rows, of_triangles] = [raster.profile(y), surface.profile(y)].map(Result::unwrap);
+        for x in [0.25, 0.5, 0.75] {
+            let heights = [&of_rows, &of_triangles].map(|line| line.height_at(x).unwrap());
+            assert!(
+                (heights[0] - heights[1]).abs() < 1e-12,
+                "{x} {y} {heights:?}"
+            );
+        }
         assert_eq!(
             of_rows.points().first(),
             of_triangles.points().first(),

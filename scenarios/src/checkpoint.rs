@@ -11,7 +11,7 @@ use colluvium_dem::Record;
 use std::io::ErrorKind;
 use std::path::{Path, PathBuf};
 
-const FORMAT: &str = "colluvium checkpoint 4";
+const FORMAT: &str = "colluvium checkpoint 5";
 
 /// A saved state and what belongs to it.
 #[derive(Debug, Default)]

@@ -79,7 +79,7 @@ fn grains_and_their_continuum_leave_the_same_heap() {
     assert!(report.contains("continuum with their calibrated law"));
 }
 
-/// Without friction they run away: beyond 1.9 radii, where those with it go 1.02.
+/// Without friction they run away: on eight grains of height to the end of the grid at 1.94 radii, where those with it go 1.02.
 #[test]
 #[ignore = "half a minute; run by tests/validate.sh"]
 fn without_friction_grains_run_away() {
@@ -90,8 +90,12 @@ fn without_friction_grains_run_away() {
         "duration_scaled=5",
     ];
     succeed(folder.path(), &run("slippery", &slippery));
-    let found = summary(&folder.path().join("slippery"));
-    assert!(value(&found, "runout_scaled") > 1.8);
+    succeed(
+        folder.path(),
+        &run("glass", &["grains.calibrated=none", "duration_scaled=5"]),
+    );
+    let [slippery, glass] = ["slippery", "glass"].map(|name| summary(&folder.path().join(name)));
+    assert!(value(&slippery, "runout_scaled") > 1.7 * value(&glass, "runout_scaled"));
 }
 
 #[test]

@@ -281,8 +281,8 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
     /// Makes one step of at most `limit`. A step that does not converge is halved and tried again.
     ///
     /// # Errors
-    /// [`Error::OutOfRange`] for a `limit` that is not above 0, [`Error::NotConverged`] when halving does not help, and what the solver refuses; the state is then that of before
-    /// the step, but that from rest the velocity may have its first half of a step.
+    /// [`Error::OutOfRange`] for a `limit` that is not above 0; [`Error::NotConverged`] when halving does not help, and what the
+    /// solver refuses. The state is then that of before the step, but that from rest the velocity may have its first half of a step.
     pub fn step(&mut self, limit: f64) -> Result<SurfaceStep, Error> {
         require_forwards("limit", limit)?;
         let mut record = SurfaceStep::default();
@@ -462,7 +462,7 @@ impl<R: Rheology, const D: usize, const C: usize, const V: usize> SurfaceFlow<R,
     }
 }
 
-/// Refuses a time step that does not go forwards (natural units); one without a limit does.
+/// Refuses a time step that does not go forwards (natural units).
 fn require_forwards(key: &'static str, value: f64) -> Result<(), Error> {
     match value > 0.0 {
         true => Ok(()),

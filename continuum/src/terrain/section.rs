@@ -13,8 +13,14 @@ impl Surface {
     /// # Errors
     /// [`Error::OutOfRange`] where the plane meets no triangle, or a loop, or several lines.
     pub fn profile(&self, y: f64) -> Result<Profile, Error> {
-        // Corners on the plane count as beyond it, but on the edge of the surface, where nothing lies before them.
-        let lowest = (self.vertices().iter()).fold(f64::INFINITY, |least, x| least.min(x[1]));
+        let ends = (self.vertices().iter()).fold([f64::INFINITY, f64::NEG_INFINITY], |ends, x| {
+            [ends[0].min(x[1]), ends[1].max(x[1])]
+        });
+        // An edge is met where it is nearer than round-off.
+        let is_met = |end: &f64| (y - end).abs() <= SAME * (ends[1] - ends[0]);
+        let y = ends.into_iter().find(is_met).unwrap_or(y);
+        // Corners on the plane count as beyond it, but on the first edge of the surface, where nothing lies before them.
+        let [lowest, _] = ends;
         let is_before = |place: f64| place < y || (y == lowest && place == y);
         let mut pieces = Vec::new();
         for corners in self.triangles() {

@@ -58,16 +58,23 @@ impl<const D: usize, const S: usize> CellJoint<D, S> {
     /// of as many cells.
     pub fn fill<'a>(&mut self, front: &'a [f64], more: usize, rows: Rows) -> Option<&'a [f64]> {
         let cells = self.slips.len();
-        if front.len() != Self::front_length(cells, more) {
+        let [exchanges, monitors, windows, accelerations, owed, spins] = rows;
+        let lengths = [front, accelerations, owed, spins].map(<[f64]>::len);
+        if lengths
+            != [
+                Self::front_length(cells, more),
+                D * cells,
+                D * cells,
+                S * cells,
+            ]
+        {
             return None;
         }
-        let [exchanges, monitors, windows, accelerations, owed, spins] = rows;
         self.exchanges = *exchanges.first()? as u64;
         self.monitors = CellMonitors::of(monitors.try_into().ok()?);
         self.windows.take_up(windows)?;
         (self.accelerations, self.owed) = (vectors(accelerations), vectors(owed));
         self.spins = vectors(spins);
-        let lengths = [self.accelerations.len(), self.owed.len(), self.spins.len()];
         let (scalars, rest) = front.split_first_chunk::<SCALARS>()?;
         self.made = scalars[1] as u64;
         self.laid_at = scalars[2] as u64;
@@ -82,6 +89,6 @@ impl<const D: usize, const S: usize> CellJoint<D, S> {
             given.relaxation = vectors(&numbers[..D * cells]);
             given.spin = vectors(&numbers[D * cells..(D + S) * cells]);
         }
-        (lengths == [cells; 3]).then_some(more)
+        Some(more)
     }
 }

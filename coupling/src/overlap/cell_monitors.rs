@@ -8,8 +8,8 @@ use colluvium_continuum::free_surface::SurfaceStep;
 pub struct CellMonitors {
     /// Exchanges seen.
     pub exchanges: f64,
-    /// Σ of the force through the handshake surface, along x or normal to the sides of a box, of what crosses it as grains and of the
-    /// continuum's stress (N).
+    /// Σ of the force through the handshake surface (N), along x for a column, normal to the sides for a box: of the grains, by their
+    /// contacts and for a column by fluctuations of their velocities, too, and of the continuum's stress.
     pub force: [f64; 2],
     /// Most grains beyond the edge by more than a diameter along its normal.
     pub escaped: f64,

@@ -110,7 +110,7 @@ pub(super) fn surface_factor(fraction: f64) -> f64 {
 }
 
 /// Contacts of the grains that belong to the material, each with the middle of its line (m), the force (N) on the grain that it begins at,
-/// and the line to the other centre (m). What does not belong is wall: its half of the line is not material.
+/// and the part of the line to the other centre that is material (m). What does not belong is wall: its half of the line is not.
 pub(super) fn lines(
     snapshot: &Snapshot,
     belongs: impl Fn(&GrainSample) -> bool,

@@ -104,7 +104,7 @@ pub(super) fn variances<'a, const D: usize, const N: usize>(
     sums
 }
 
-/// Granular temperature ⟨v′²⟩/3 of grains with labels that rise into them: of the buffer, of the inner overlap, and of grains beyond it
+/// Granular temperature ⟨v′²⟩/3 of grains with labels, which grow from the edge on into the grains (in the unit of their ends): of the buffer, of the inner overlap, and of grains beyond it
 /// up to its width (m²/s²).
 pub(super) fn temperatures<'a>(
     grains: impl Iterator<Item = (&'a GrainSample, f64)>,

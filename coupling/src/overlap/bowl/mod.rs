@@ -262,6 +262,7 @@ pub struct Bowl {
     /// L of all cells after the last exchange (1/s), of a box that grows.
     gradients: Vec<Matrix3<f64>>,
     account: Account,
+    /// Grains times their steps.
     grain_steps: f64,
     sighting: Sighting,
     scratch: exchange::Scratch,

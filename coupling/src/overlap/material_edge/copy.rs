@@ -6,8 +6,8 @@
 //! ```text
 //! f = clamp(H_i/h − k, 0, 1) M(ξ < ξ_a)/M,      H_i = Σ_k M/(ρ h W)
 //! ```
-//! and its velocity follows theirs (`following.rs`), but for faces up to the ground's. So the surface at ξ_a moves as the grains do, no matter comes loose from it, and the copy weighs what they weigh. Volume
-//! and momentum that this adds are booked. Between two exchanges matter does come loose from the copy's end, by little and
+//! and its velocity follows theirs (`following.rs`); faces at or below the ground's level stay. So the surface at ξ_a moves as
+//! the grains do, no matter comes loose from it, and the copy weighs what they weigh. Volume and momentum that this adds are booked. Between two exchanges matter does come loose from the copy's end, by little and
 //! fast; it is made anew before it gets anywhere, and the next step's length must not remember how fast it was.
 
 use super::{Continuum, MaterialEdge, OverlapError};
