@@ -1,7 +1,11 @@
 //! Beds that settle on a rough base.
 
-use colluvium_dem::preparation::{InclineBed, RadiusLaw, settle_incline_bed};
-use colluvium_dem::{ContactLaw, Hooke, ShapeParameter, Tangential, TangentialSpring, Threads};
+use colluvium_dem::preparation::{
+    InclineBed, RadiusLaw, settle_incline_bed, settle_incline_bed_from,
+};
+use colluvium_dem::{
+    ContactLaw, Hooke, ShapeParameter, Simulation, Tangential, TangentialSpring, Threads,
+};
 use std::ops::ControlFlow;
 
 /// Moderate-friction grains in units of d, mean mass and g.
@@ -76,4 +80,39 @@ fn a_bed_that_does_not_come_to_rest_is_refused() {
     let error = settle_incline_bed(&spec, Threads::Serial, &mut |_| ControlFlow::Continue(()));
     let error = error.unwrap_err().to_string();
     assert!(error.contains("not at rest after 400"), "{error}");
+}
+
+#[test]
+fn a_bed_that_is_stopped_settles_on_to_the_same_bits() {
+    let spec = spec(3);
+    let mut looks = 0;
+    let whole = settle_incline_bed(&spec, Threads::Serial, &mut |_| {
+        looks += 1;
+        ControlFlow::Continue(())
+    })
+    .unwrap();
+    for stop_at in [1, looks / 3, looks] {
+        let (mut seen, mut state) = (0, None);
+        let error = settle_incline_bed_from(None, &spec, Threads::Serial, &mut |_, simulation| {
+            seen += 1;
+            if seen < stop_at {
+                return ControlFlow::Continue(());
+            }
+            state = Some(simulation.checkpoint());
+            ControlFlow::Break(())
+        });
+        assert!(error.is_err());
+        let go = &mut |_, _: &mut Simulation| ControlFlow::Continue(());
+        let again = settle_incline_bed_from(state.as_ref(), &spec, Threads::Serial, go).unwrap();
+        assert!(
+            again.grains == whole.grains && again.report == whole.report,
+            "{stop_at}"
+        );
+        // Another bed's state is refused.
+        let other = InclineBed {
+            grains: spec.grains + 1,
+            ..spec.clone()
+        };
+        assert!(settle_incline_bed_from(state.as_ref(), &other, Threads::Serial, go).is_err());
+    }
 }

@@ -5,6 +5,8 @@ use nalgebra::{UnitQuaternion, Vector3};
 use std::f64::consts::PI;
 use std::ops::ControlFlow;
 
+mod goes_on;
+
 fn go(_: &RestMeasures) -> ControlFlow<()> {
     ControlFlow::Continue(())
 }
@@ -237,6 +239,12 @@ fn poured(
 ) -> (Simulation, PouringReport) {
     let mut simulation = Simulation::new(floor(6.0, 30.0, Vec::new(), law)).unwrap();
     simulation.set_threads(threads);
+    let (spec, relaxation) = pouring(seed, count);
+    let report = pour(&mut simulation, &spec, &relaxation, &mut go).unwrap();
+    (simulation, report)
+}
+
+fn pouring(seed: u64, count: usize) -> (Pouring, Relaxation) {
     let spec = Pouring {
         source: block([0.0, 0.0, 20.0], [6.0, 6.0, 26.0]),
         ingredients: vec![Ingredient::alone(
@@ -260,8 +268,7 @@ fn poured(
         },
         ..Relaxation::under(1.0)
     };
-    let report = pour(&mut simulation, &spec, &relaxation, &mut go).unwrap();
-    (simulation, report)
+    (spec, relaxation)
 }
 
 /// Inside, away from the floor's layers and the surface.
@@ -457,6 +464,10 @@ fn dust() -> SizeLaw {
 
 /// Grains that stick and resist rolling.
 fn sticking(grains: Vec<Grain>, threads: Threads) -> Simulation {
+    Simulation::new(sticking_setup(grains, threads)).unwrap()
+}
+
+fn sticking_setup(grains: Vec<Grain>, threads: Threads) -> Setup {
     let law = ContactLaw {
         rolling: Rolling::Epsd(Epsd {
             rolling_friction: 1.0,
@@ -477,7 +488,7 @@ fn sticking(grains: Vec<Grain>, threads: Threads) -> Simulation {
         upper: Vector3::repeat(0.4),
         periodic: [false; 3],
     };
-    Simulation::new(Setup {
+    Setup {
         domain,
         gravity: Vector3::zeros(),
         law: law.into(),
@@ -486,8 +497,7 @@ fn sticking(grains: Vec<Grain>, threads: Threads) -> Simulation {
         bodies: Vec::new(),
         timestep: 2e-4,
         threads,
-    })
-    .unwrap()
+    }
 }
 
 fn boulder(solid_fraction: f64, probe: f64) -> CentralCompaction {

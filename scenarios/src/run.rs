@@ -58,6 +58,7 @@ use crate::summary::{Status, Summary};
 use crate::table::Table;
 pub use angle_of_repose::PUBLISHED_ANGLES;
 use colluvium_dem::{Record, Threads};
+use std::cell::RefCell;
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -117,13 +118,19 @@ pub struct Under<'a> {
     pub threads: usize,
     start: Instant,
     wall_before: f64,
-    checkpoints: Checkpoints,
-    last_checkpoint: Instant,
-    /// Wall time from one checkpoint to the next.
-    pause: Duration,
+    saving: RefCell<Saving>,
     given_pause: Option<Duration>,
     /// Whether the state is there and work may begin: until then a resumed run writes nothing.
     begun: bool,
+}
+
+/// When checkpoints are written, and where.
+#[derive(Debug)]
+struct Saving {
+    checkpoints: Checkpoints,
+    last: Instant,
+    /// Wall time from one checkpoint to the next.
+    pause: Duration,
 }
 
 impl Under<'_> {
@@ -154,13 +161,10 @@ impl Under<'_> {
     /// Writes a checkpoint if one is due or the user asked to stop; the latter ends the run.
     ///
     /// `record` is only called when a checkpoint is written.
-    pub fn checkpoint(
-        &mut self,
-        stage: &str,
-        record: impl FnOnce() -> Record,
-    ) -> Result<(), Failure> {
+    pub fn checkpoint(&self, stage: &str, record: impl FnOnce() -> Record) -> Result<(), Failure> {
         let stop = crate::interruption::requested();
-        if !stop && self.last_checkpoint.elapsed() < self.pause {
+        let mut saving = self.saving.borrow_mut();
+        if !stop && saving.last.elapsed() < saving.pause {
             return Ok(());
         }
         let begin = Instant::now();
@@ -169,14 +173,15 @@ impl Under<'_> {
             stage: stage.to_owned(),
             wall_s: self.wall_s(),
         };
-        self.checkpoints.write(&self.scene.name, &checkpoint)?;
-        self.last_checkpoint = Instant::now();
-        self.pause = self
+        saving.checkpoints.write(&self.scene.name, &checkpoint)?;
+        saving.last = Instant::now();
+        saving.pause = self
             .given_pause
             .unwrap_or_else(|| CHECKPOINT_EVERY.max(WRITES_APART * begin.elapsed()));
         self.directory
             .journal
             .note(&format!("checkpoint ({stage})"));
+        drop(saving);
         if stop {
             Err(self.interrupted())
         } else {
@@ -188,7 +193,10 @@ impl Under<'_> {
     pub fn interrupted(&self) -> Failure {
         Failure::Interrupted {
             directory: self.directory.path().to_owned(),
-            resumes: Resumes::from_saved(self.checkpoints.exist()),
+            resumes: Resumes::from_saved(
+                self.saving.borrow().checkpoints.exist()
+                    || world::kept_steps::exist(self.directory.path()),
+            ),
         }
     }
 }
@@ -236,10 +244,19 @@ pub fn already_done(directory: &RunDirectory) -> Result<Ended, Failure> {
 /// Removes what only a run under way needs.
 fn tidy(directory: &RunDirectory) -> Result<(), Failure> {
     Checkpoints::of(directory.path()).remove()?;
-    frames::remove(directory.path()).map_err(|error| {
-        let folder = directory.file(frames::FOLDER);
-        Failure::Run(format!("cannot remove {}: {error}", folder.display()))
-    })
+    for (folder, removed) in [
+        (
+            world::kept_steps::FOLDER,
+            world::kept_steps::remove(directory.path()),
+        ),
+        (frames::FOLDER, frames::remove(directory.path())),
+    ] {
+        removed.map_err(|error| {
+            let folder = directory.file(folder);
+            Failure::Run(format!("cannot remove {}: {error}", folder.display()))
+        })?;
+    }
+    Ok(())
 }
 
 /// Threads that compute.
@@ -300,9 +317,11 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> {
         threads,
         start: Instant::now(),
         wall_before,
-        checkpoints,
-        last_checkpoint: Instant::now(),
-        pause: options.checkpoint_every.unwrap_or(CHECKPOINT_EVERY),
+        saving: RefCell::new(Saving {
+            checkpoints,
+            last: Instant::now(),
+            pause: options.checkpoint_every.unwrap_or(CHECKPOINT_EVERY),
+        }),
         given_pause: options.checkpoint_every,
         begun: false,
     };

@@ -10,6 +10,7 @@ use crate::failure::Failure;
 use crate::journal::Journal;
 use crate::report;
 use crate::results_file::put_in_place;
+use crate::run::world::kept_steps;
 use crate::scene::Scene;
 use crate::summary::{Status, Summary};
 use crate::table::Table;
@@ -449,6 +450,7 @@ fn remove_old_run(path: &Path) -> std::io::Result<()> {
         }
     }
     crate::render::remove(path)?;
+    kept_steps::remove(path)?;
     crate::frames::remove(path)
 }
 

@@ -3,8 +3,9 @@
 
 use super::ingredients::Amount;
 use super::pouring::{Pouring, PouringReport, pour_by};
-use super::relaxation::{Relaxation, Watch};
+use super::relaxation::Relaxation;
 use super::scattering::ClumpShape;
+use super::watch::Watch;
 use crate::grains::Grain;
 use crate::region::Region;
 use crate::setup::SetupError;
@@ -39,7 +40,7 @@ pub fn pour_clumps(
     simulation: &mut Simulation,
     spec: &ClumpPouring,
     relaxation: &Relaxation,
-    watch: Watch,
+    watch: &mut dyn Watch,
 ) -> Result<PouringReport, SetupError> {
     let shape = &spec.shape;
     shape.validate("clump")?;

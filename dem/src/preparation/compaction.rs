@@ -9,9 +9,10 @@
 //! only as far as their friction holds them.
 
 use super::coordination::{Coordination, HELD_BY_FRICTION};
-use super::relaxation::{Relaxation, Watch, time_unit};
+use super::relaxation::{Relaxation, time_unit};
 use super::rest::RestMeasures;
 use super::solid_fraction::solid_fraction;
+use super::watch::{Trail, Watch};
 use crate::loads::Load;
 use crate::region::Region;
 use crate::setup::{SetupError, check};
@@ -86,19 +87,35 @@ const LOOKS: f64 = 10.0;
 pub fn compact(
     simulation: &mut Simulation,
     spec: &CentralCompaction,
-    watch: Watch,
+    watch: &mut dyn Watch,
 ) -> Result<CompactionReport, SetupError> {
     spec.validate(simulation)?;
-    let before = spec.measure(simulation);
-    if before > spec.solid_fraction * (1.0 + spec.tolerance) {
-        return Err(spec.missed(before, "the cloud is denser before it is pulled"));
-    }
-    let mut acceleration = spec.accelerations[0];
-    let mut target = spec.solid_fraction;
-    let mut reached = before;
-    for pull in 1..=PULLS {
-        spec.pull(simulation, target, &mut acceleration, watch)?;
-        let rest = spec.let_go(simulation, watch)?;
+    let mut trail = Trail::of(watch);
+    let mut reached = spec.measure(simulation);
+    let (first, mut target, mut acceleration, mut pulled) = match trail.next()? {
+        Some([pull, target, acceleration, pulled]) => {
+            let [target, acceleration] = [target, acceleration].map(f64::from_bits);
+            (pull as u32, target, acceleration, pulled != 0)
+        }
+        None if reached > spec.solid_fraction * (1.0 + spec.tolerance) => {
+            return Err(spec.missed(reached, "the cloud is denser before it is pulled"));
+        }
+        None => (1, spec.solid_fraction, spec.accelerations[0], false),
+    };
+    for pull in first..=PULLS {
+        let counts = |acceleration: f64, pulled: bool| {
+            let [target, acceleration] = [target, acceleration].map(f64::to_bits);
+            [pull.into(), target, acceleration, pulled.into()]
+        };
+        if !pulled {
+            trail.enter(&counts(acceleration, false));
+            spec.pull(simulation, (target, &mut acceleration), &mut trail, watch)?;
+            trail.leave(4);
+        }
+        trail.enter(&counts(acceleration, true));
+        let rest = spec.let_go(simulation, &mut trail, watch)?;
+        trail.leave(4);
+        pulled = false;
         reached = spec.measure(simulation);
         let missing = spec.solid_fraction - reached;
         if missing.abs() <= spec.tolerance * spec.solid_fraction {
@@ -178,17 +195,23 @@ impl CentralCompaction {
     fn pull(
         &self,
         simulation: &mut Simulation,
-        target: f64,
-        acceleration: &mut f64,
-        watch: Watch,
+        (target, acceleration): (f64, &mut f64),
+        trail: &mut Trail,
+        watch: &mut dyn Watch,
     ) -> Result<(), SetupError> {
-        let mut gathered = hangs_together(simulation);
+        let (mut gathered, mut done) = match trail.next()? {
+            Some([gathered, look, pull]) => {
+                *acceleration = f64::from_bits(pull);
+                (gathered != 0, look)
+            }
+            None => (hangs_together(simulation), 0),
+        };
         loop {
             let unit = time_unit(simulation, *acceleration);
             let steps = (unit / LOOKS / simulation.timestep()).ceil().max(1.0);
             let keep = (-self.relaxation.damping * steps * simulation.timestep() / unit).exp();
             let looks = (self.relaxation.patience * LOOKS) as u64;
-            for _ in 0..looks.max(1) {
+            for look in done + 1..=looks.max(1) {
                 self.load(simulation, *acceleration)?;
                 simulation.advance(steps as u64)?;
                 simulation.damp(keep);
@@ -196,14 +219,13 @@ impl CentralCompaction {
                     return Ok(());
                 }
                 let rest = simulation.rest_measures(*acceleration);
-                if watch(&rest).is_break() {
-                    return Err(SetupError::Interrupted);
-                }
                 if self.relaxation.rest.holds(&rest) {
                     break;
                 }
+                let counts = [gathered.into(), look, acceleration.to_bits()];
+                trail.show(watch, simulation, (&rest, &counts))?;
             }
-            gathered = true;
+            (gathered, done) = (true, 0);
             let reached = self.measure(simulation);
             if reached >= target {
                 return Ok(());
@@ -236,22 +258,25 @@ impl CentralCompaction {
     fn let_go(
         &self,
         simulation: &mut Simulation,
-        watch: Watch,
+        trail: &mut Trail,
+        watch: &mut dyn Watch,
     ) -> Result<RestMeasures, SetupError> {
-        simulation.set_loads(&[])?;
-        simulation.damp(0.0);
+        let (mut quiet, done) = match trail.next()? {
+            Some([quiet, look]) => (quiet, look),
+            None => {
+                simulation.set_loads(&[])?;
+                simulation.damp(0.0);
+                (0, 0)
+            }
+        };
         let (acceleration, relaxation) = (self.accelerations[0], &self.relaxation);
-        let mut quiet = 0;
         let unit = time_unit(simulation, acceleration);
         let steps = (unit / LOOKS / simulation.timestep()).ceil().max(1.0);
         let keep = (-relaxation.damping * steps * simulation.timestep() / unit).exp();
-        for _ in 0..(relaxation.patience * LOOKS) as u64 {
+        for look in done + 1..=(relaxation.patience * LOOKS) as u64 {
             simulation.advance(steps as u64)?;
             simulation.damp(keep);
             let rest = simulation.rest_measures(acceleration);
-            if watch(&rest).is_break() {
-                return Err(SetupError::Interrupted);
-            }
             quiet = if rest.kinetic <= relaxation.rest.kinetic {
                 quiet + 1
             } else {
@@ -260,6 +285,7 @@ impl CentralCompaction {
             if quiet >= 3 {
                 return Ok(rest);
             }
+            trail.show(watch, simulation, (&rest, &[quiet, look]))?;
         }
         Err(SetupError::Restless {
             measures: Box::new(simulation.rest_measures(acceleration)),

@@ -3,10 +3,12 @@
 //! Loose grains fall on a floor to which the first ones stick: a rough base made of the flow's own
 //! grains (Thuillet 2019, §2.3.2). The rest settles on it under gravity normal to the floor.
 
+use super::watch::stopped;
 use super::{RadiusLaw, Rest};
 use crate::contact::ContactLaw;
 use crate::domain::Domain;
 use crate::grains::Grain;
+use crate::record::Record;
 use crate::setup::{Setup, SetupError, Threads, check};
 use crate::simulation::Simulation;
 use crate::snapshot::Snapshot;
@@ -91,14 +93,29 @@ pub fn settle_incline_bed(
     threads: Threads,
     progress: &mut dyn FnMut(f64) -> ControlFlow<()>,
 ) -> Result<Bed, SetupError> {
+    settle_incline_bed_from(None, spec, threads, &mut |share, _| progress(share))
+}
+
+/// The same, from the state ([`Simulation::checkpoint`]) that `progress` has been shown before, if it is given one.
+///
+/// # Errors
+/// As [`settle_incline_bed`]; if the state is of another bed.
+pub fn settle_incline_bed_from(
+    state: Option<&Record>,
+    spec: &InclineBed,
+    threads: Threads,
+    progress: &mut dyn FnMut(f64, &mut Simulation) -> ControlFlow<()>,
+) -> Result<Bed, SetupError> {
     spec.radius.validate()?;
     check("grains.count", spec.grains as f64, "> 0", |v| v > 0.0)?;
     check("gravity", spec.gravity, "> 0 m/s²", |v| v > 0.0)?;
     let diameter = 2.0 * spec.radius.mean();
     let time_unit = (diameter / spec.gravity).sqrt();
     let (domain, cloud) = loose_cloud(spec, time_unit);
+    let mass: f64 = cloud.iter().map(Grain::mass).sum();
+    let scale = mass * spec.gravity * diameter;
     let floor = Wall::plane(Vector3::zeros(), Vector3::z());
-    let mut simulation = Simulation::new(Setup {
+    let setup = Setup {
         domain,
         gravity: Vector3::new(0.0, 0.0, -spec.gravity),
         law: spec.law.into(),
@@ -107,24 +124,21 @@ pub fn settle_incline_bed(
         bodies: Vec::new(),
         timestep: spec.timestep,
         threads,
-    })?;
-    let scale = simulation.free_mass() * spec.gravity * diameter;
-    let mut kinetic;
+    };
+    let mut simulation = match state {
+        Some(record) => Simulation::resume(setup, record)?,
+        None => Simulation::new(setup)?,
+    };
     let longest = (PATIENCE * time_unit / spec.timestep) as u64;
-    loop {
+    let kinetic = loop {
         for _ in 0..10 {
             simulation.advance(LOOK_EVERY)?;
             simulation.fix(|g| g.position.z < g.radius)?;
         }
-        kinetic = simulation.energy().kinetic() / scale;
-        // Kinetic energy falls by decades once the cloud has landed: its logarithm measures progress.
-        let share = (1.0 - (kinetic / AT_REST).max(1.0).log10() / 9.0).clamp(0.0, 1.0);
-        if progress(share).is_break() {
-            return Err(SetupError::Interrupted);
-        }
+        let kinetic = simulation.energy().kinetic() / scale;
         let landed = simulation.time() > 8.0 * time_unit;
         if landed && kinetic < AT_REST {
-            break;
+            break kinetic;
         }
         if simulation.steps_done() > longest {
             return Err(SetupError::Restless {
@@ -136,7 +150,10 @@ pub fn settle_incline_bed(
                 patience: PATIENCE,
             });
         }
-    }
+        // Kinetic energy falls by decades once the cloud has landed: its logarithm measures progress.
+        let share = (1.0 - (kinetic / AT_REST).max(1.0).log10() / 9.0).clamp(0.0, 1.0);
+        stopped(progress(share, &mut simulation))?;
+    };
     let bed = collect(spec, &mut simulation, kinetic);
     let found = bed.report.grains as f64;
     let word = "as many as asked for: more than the floor can hold have stuck to it";

@@ -14,9 +14,10 @@ use super::coordination::{Coordination, HELD_FRICTIONLESS};
 use super::ingredients::Ingredient;
 use super::insertion::insert_in_cube;
 use super::packing::Packing;
-use super::relaxation::{Watch, time_unit};
+use super::relaxation::time_unit;
 use super::rest::RestMeasures;
 use super::size_report::SizeReport;
+use super::watch::{Look, Watch, stopped};
 use crate::contact::{ContactLaw, Hooke, Tangential, TangentialSpring};
 use crate::grains::Grain;
 use crate::setup::{Setup, SetupError, Threads, check};
@@ -82,7 +83,7 @@ const LOOKS: u32 = 20_000;
 const UNBALANCED: f64 = 3e-3;
 
 /// Makes a jammed packing in a cube.
-pub fn jam(spec: &Jamming, watch: Watch) -> Result<(Packing, JammingReport), SetupError> {
+pub fn jam(spec: &Jamming, watch: &mut dyn Watch) -> Result<(Packing, JammingReport), SetupError> {
     check("jamming.quench", spec.quench, "in [0.5, 0.9]", |v| {
         (0.5..=0.9).contains(&v)
     })?;
@@ -161,7 +162,7 @@ impl Jamming {
 
 /// Brings grains to rest in a box. Velocities are taken out whenever their energy begins to fall
 /// (kinetic damping): it drops fast where forces push back.
-fn rest(packing: &Packing, done: f64, watch: Watch) -> Result<Rested, SetupError> {
+fn rest(packing: &Packing, done: f64, watch: &mut dyn Watch) -> Result<Rested, SetupError> {
     let mut simulation = simulation(packing)?;
     let (mass, diameter) = {
         let n = packing.grains.len() as f64;
@@ -176,9 +177,7 @@ fn rest(packing: &Packing, done: f64, watch: Watch) -> Result<Rested, SetupError
     for look in 0..LOOKS {
         simulation.advance(LOOK_EVERY)?;
         measures = simulation.rest_measures(acceleration);
-        if watch(&measures).is_break() {
-            return Err(SetupError::Interrupted);
-        }
+        stopped(watch.look(&mut Look::passing(&measures)))?;
         if measures.kinetic < kinetic {
             simulation.damp(0.0);
             kinetic = 0.0;

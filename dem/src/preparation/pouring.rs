@@ -5,9 +5,10 @@
 
 use super::ingredients::{Amount, Ingredient, draw};
 use super::insertion::{Insertion, Places};
-use super::relaxation::{Relaxation, Watch, relax};
+use super::relaxation::{Relaxation, relax_along};
 use super::rest::RestMeasures;
 use super::size_report::SizeReport;
+use super::watch::{Trail, Watch};
 use crate::grains::Grain;
 use crate::region::Region;
 use crate::setup::{SetupError, check};
@@ -80,7 +81,7 @@ pub fn pour(
     simulation: &mut Simulation,
     spec: &Pouring,
     relaxation: &Relaxation,
-    watch: Watch,
+    watch: &mut dyn Watch,
 ) -> Result<PouringReport, SetupError> {
     let mut enter = |simulation: &mut Simulation, batch: &[Grain], _: &mut ChaCha8Rng| {
         simulation.insert(batch).map(drop)
@@ -97,7 +98,7 @@ pub(super) fn pour_by(
     simulation: &mut Simulation,
     spec: &Pouring,
     relaxation: &Relaxation,
-    watch: Watch,
+    watch: &mut dyn Watch,
     enter: Enter,
 ) -> Result<PouringReport, SetupError> {
     let source = spec.source(simulation);
@@ -110,7 +111,11 @@ pub(super) fn pour_by(
     let grains = draw(&spec.ingredients, spec.amount, volume, &mut random)?;
     let interval = spec.interval(simulation, &source)?;
     let steps = (interval / simulation.timestep()).ceil().max(1.0) as u64;
+    let mut trail = Trail::of(watch);
     let (mut next, mut batches, mut blocked) = (0, 0, 0);
+    if let Some(counts) = trail.next()? {
+        (next, batches, blocked) = gone_on(counts, &grains, &mut random)?;
+    }
     while next < grains.len() {
         let batch = place(
             simulation,
@@ -134,11 +139,12 @@ pub(super) fn pour_by(
             });
         }
         simulation.advance(steps)?;
-        if watch(&simulation.rest_measures(relaxation.acceleration)).is_break() {
-            return Err(SetupError::Interrupted);
-        }
+        let measures = simulation.rest_measures(relaxation.acceleration);
+        let counts = counts_of((next, batches, blocked), &random);
+        trail.show(watch, simulation, (&measures, &counts))?;
     }
-    let rest = relax(simulation, relaxation, watch)?;
+    trail.enter(&counts_of((next, batches, blocked), &random));
+    let rest = relax_along(simulation, relaxation, &mut trail, watch)?;
     let sizes = spec.ingredients.iter();
     Ok(PouringReport {
         grains: grains.len(),
@@ -149,6 +155,28 @@ pub(super) fn pour_by(
             .collect(),
         rest,
     })
+}
+
+/// Grains that are in, batches and batches in a row without room; then the place in the stream of random words.
+fn counts_of((next, batches, blocked): (usize, u32, u32), random: &ChaCha8Rng) -> [u64; 5] {
+    let word = random.get_word_pos();
+    let [low, high] = [word as u64, (word >> 64) as u64];
+    [next as u64, batches.into(), blocked.into(), low, high]
+}
+
+/// The same of a pouring that goes on.
+fn gone_on(
+    [next, batches, blocked, low, high]: [u64; 5],
+    grains: &[Grain],
+    random: &mut ChaCha8Rng,
+) -> Result<(usize, u32, u32), SetupError> {
+    random.set_word_pos(u128::from(high) << 64 | u128::from(low));
+    match (next as usize, batches.try_into(), blocked.try_into()) {
+        (next, Ok(batches), Ok(blocked)) if next <= grains.len() => Ok((next, batches, blocked)),
+        _ => Err(SetupError::Record(
+            "a pouring of more grains than there are".into(),
+        )),
+    }
 }
 
 impl Pouring {

@@ -7,10 +7,10 @@
 //! the whole packing, and changes no state of rest.
 
 use super::rest::{Rest, RestMeasures};
+use super::watch::{Trail, Watch};
 use crate::setup::{SetupError, check};
 use crate::simulation::Simulation;
 use serde::{Deserialize, Serialize};
-use std::ops::ControlFlow;
 
 /// How grains are brought to rest.
 #[derive(Clone, Copy, Debug, PartialEq, Serialize, Deserialize)]
@@ -55,9 +55,6 @@ impl Relaxation {
     }
 }
 
-/// Whoever watches a preparation; it may stop it.
-pub type Watch<'a> = &'a mut dyn FnMut(&RestMeasures) -> ControlFlow<()>;
-
 /// Looks in the time √(d̄/a).
 const LOOKS: f64 = 20.0;
 /// Looks between measures of rest.
@@ -70,15 +67,27 @@ const MEASURE_EVERY: u64 = 5;
 pub fn relax(
     simulation: &mut Simulation,
     spec: &Relaxation,
-    watch: Watch,
+    watch: &mut dyn Watch,
+) -> Result<RestMeasures, SetupError> {
+    let mut trail = Trail::of(watch);
+    relax_along(simulation, spec, &mut trail, watch)
+}
+
+/// The same within another preparation.
+pub(super) fn relax_along(
+    simulation: &mut Simulation,
+    spec: &Relaxation,
+    trail: &mut Trail,
+    watch: &mut dyn Watch,
 ) -> Result<RestMeasures, SetupError> {
     spec.validate()?;
+    let done = trail.next()?.map_or(0, |[look]| look);
     let unit = time_unit(simulation, spec.acceleration);
     let steps = (unit / LOOKS / simulation.timestep()).ceil().max(1.0);
     let keep = (-spec.damping * steps * simulation.timestep() / unit).exp();
     let looks = (spec.patience * unit / (steps * simulation.timestep())).ceil() as u64;
     let mut measures = simulation.rest_measures(spec.acceleration);
-    for look in 1..=looks.max(MEASURE_EVERY) {
+    for look in done + 1..=looks.max(MEASURE_EVERY) {
         simulation.advance(steps as u64)?;
         if keep < 1.0 {
             simulation.damp(keep);
@@ -87,12 +96,10 @@ pub fn relax(
             continue;
         }
         measures = simulation.rest_measures(spec.acceleration);
-        if watch(&measures).is_break() {
-            return Err(SetupError::Interrupted);
-        }
         if spec.rest.holds(&measures) {
             return Ok(measures);
         }
+        trail.show(watch, simulation, (&measures, &[look]))?;
     }
     Err(SetupError::Restless {
         measures: Box::new(measures),

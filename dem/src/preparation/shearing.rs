@@ -10,8 +10,8 @@
 
 use super::ingredients::Ingredient;
 use super::insertion::insert_in_cube;
-use super::relaxation::Watch;
 use super::sheared_cell::ShearedCell;
+use super::watch::{Look, Watch, stopped};
 use crate::boundaries::{BoxMotion, Edge};
 use crate::contact::Laws;
 use crate::grains::Grain;
@@ -141,7 +141,10 @@ impl Shearing {
 ///
 /// # Errors
 /// If a number is out of its range, the pressure was not reached, the grains fly apart, or `watch` stops it.
-pub fn shear(spec: &Shearing, watch: Watch) -> Result<(ShearedCell, ShearingReport), SetupError> {
+pub fn shear(
+    spec: &Shearing,
+    watch: &mut dyn Watch,
+) -> Result<(ShearedCell, ShearingReport), SetupError> {
     let (mut simulation, report) = steady_shear(spec, watch)?;
     let mut cell = ShearedCell::of(&mut simulation, spec.rate());
     (cell.pressure, cell.friction) = (report.pressure, report.friction);
@@ -155,7 +158,7 @@ pub fn shear(spec: &Shearing, watch: Watch) -> Result<(ShearedCell, ShearingRepo
 /// As [`shear`].
 pub fn steady_shear(
     spec: &Shearing,
-    watch: Watch,
+    watch: &mut dyn Watch,
 ) -> Result<(Simulation, ShearingReport), SetupError> {
     spec.validate()?;
     let rate = spec.rate();
@@ -179,9 +182,7 @@ pub fn steady_shear(
             stress += simulation.stress() / LOOKS as f64;
         }
         let measures = simulation.rest_measures(rate * rate * spec.diameter);
-        if watch(&measures).is_break() {
-            return Err(SetupError::Interrupted);
-        }
+        stopped(watch.look(&mut Look::passing(&measures)))?;
         strain += LOOKS as f64 * each as f64 * spec.timestep * rate;
         let volume = simulation.domain().lengths().product();
         if strain > (1.0 - LAST) * spec.strain {

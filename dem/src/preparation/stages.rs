@@ -6,9 +6,10 @@
 //! stiffness follows gravity (`stiffness.rs`) and contacts keep their springs, as displacements, from
 //! stage to stage: all forces then fall together and the bed stays in balance.
 
-use super::relaxation::{Relaxation, Watch, relax};
+use super::relaxation::{Relaxation, relax_along};
 use super::rest::{Rest, RestMeasures};
 use super::stiffness::{self, MeanGrain};
+use super::watch::{Trail, Watch};
 use crate::clumps::Clump;
 use crate::contact::{LawTable, Laws};
 use crate::grains::Grain;
@@ -115,49 +116,129 @@ impl fmt::Display for StageReport {
 /// # Errors
 /// If a number is out of its range, a stage does not come to rest or the grains fly apart.
 pub fn settle_in_stages(
-    mut setup: Setup,
+    setup: Setup,
     clumps: &[Clump],
     stages: &Stages,
-    watch: Watch,
+    watch: &mut dyn Watch,
 ) -> Result<(Simulation, Vec<StageReport>), SetupError> {
     stages.validate()?;
     let weight = setup.gravity.norm();
     check("gravity", weight, "a direction: longer than 0", |g| g > 0.0)?;
     let (down, laws) = (setup.gravity / weight, setup.law.clone());
-    let first = stages.choose(&laws, &setup.grains, down * stages.gravities[0])?;
-    setup.law = first.laws.clone();
-    setup.gravity = down * stages.gravities[0];
-    // Any will do: each stage sets its own before a step is made.
-    setup.timestep = 1.0;
-    let mut simulation = Simulation::new(setup)?;
-    if !clumps.is_empty() {
-        simulation.clump(clumps)?;
-    }
-    let mut reports = Vec::new();
-    for &g in &stages.gravities {
-        let grains = simulation.grain_list();
-        let chosen = stages.choose(&laws, &grains, down * g)?;
-        let step = simulation.choose_step(&chosen.laws, &chosen.conditions, &stages.shares())?;
-        simulation.go_on_under(&chosen.laws, down * g, step)?;
-        let before = height(&simulation, &down);
+    let mut trail = Trail::of(watch);
+    let (mut simulation, mut reports, mut begun) = match watch.goes_on() {
+        Some(midway) => {
+            let (begun, reports) = Begun::gone_on(&mut trail)?;
+            let &g = stages
+                .gravities
+                .get(reports.len())
+                .ok_or_else(|| SetupError::Record("a stage of more than there are".into()))?;
+            let setup = Setup {
+                law: stiffness::scaled(&laws, begun.factor),
+                gravity: down * g,
+                timestep: begun.step,
+                ..setup
+            };
+            (
+                Simulation::resume(setup, &midway.record)?,
+                reports,
+                Some(begun),
+            )
+        }
+        None => (stages.start(setup, clumps, &down)?, Vec::new(), None),
+    };
+    for &g in &stages.gravities[reports.len()..] {
+        let stage = match begun.take() {
+            Some(begun) => begun,
+            None => stages.begin(&mut simulation, &laws, (&down, g))?,
+        };
         let relaxation = Relaxation {
             damping: stages.damping,
             rest: stages.rest,
             patience: stages.patience,
             acceleration: g,
         };
-        let rest = relax(&mut simulation, &relaxation, watch)?;
+        let counts = stage.counts(&reports);
+        trail.enter(&counts);
+        let rest = relax_along(&mut simulation, &relaxation, &mut trail, watch)?;
+        trail.leave(counts.len());
         reports.push(StageReport {
             gravity: g,
-            stiffness_factor: chosen.factor,
-            timestep: step,
+            stiffness_factor: stage.factor,
+            timestep: stage.step,
             steps: simulation.steps_done(),
             largest_overlap: simulation.largest_overlap(),
-            sank: before - height(&simulation, &down),
+            sank: stage.before - height(&simulation, &down),
             rest,
         });
     }
     Ok((simulation, reports))
+}
+
+/// A stage that has begun.
+struct Begun {
+    factor: f64,
+    /// Step (s).
+    step: f64,
+    /// Height of the centre of mass before it (m).
+    before: f64,
+}
+
+impl Begun {
+    /// The stage and the reports of those before it, as counts of a loop.
+    fn counts(&self, reports: &[StageReport]) -> Vec<u64> {
+        let own = [self.factor, self.step, self.before].map(f64::to_bits);
+        let mut counts = vec![reports.len() as u64];
+        counts.extend(own);
+        counts.extend(reports.iter().flat_map(StageReport::counts));
+        counts
+    }
+
+    /// The same of stages that go on.
+    fn gone_on(trail: &mut Trail) -> Result<(Begun, Vec<StageReport>), SetupError> {
+        let cut = || SetupError::Record("the stages of the preparation are cut short".into());
+        let [done, own @ ..] = trail.next::<4>()?.ok_or_else(cut)?;
+        let [factor, step, before] = own.map(f64::from_bits);
+        let mut reports = Vec::new();
+        for _ in 0..done {
+            reports.push(StageReport::of_counts(trail.next()?.ok_or_else(cut)?));
+        }
+        let begun = Begun {
+            factor,
+            step,
+            before,
+        };
+        Ok((begun, reports))
+    }
+}
+
+impl StageReport {
+    fn counts(&self) -> [u64; 10] {
+        let rest = &self.rest;
+        let [a, b, c] = [self.gravity, self.stiffness_factor, self.timestep].map(f64::to_bits);
+        let [d, e] = [self.largest_overlap, self.sank].map(f64::to_bits);
+        let rest = [rest.kinetic, rest.unbalanced, rest.acceleration, rest.time];
+        let [f, g, h, i] = rest.map(f64::to_bits);
+        [a, b, c, self.steps, d, e, f, g, h, i]
+    }
+
+    fn of_counts(counts: [u64; 10]) -> StageReport {
+        let [a, b, c, _, d, e, f, g, h, i] = counts.map(f64::from_bits);
+        StageReport {
+            gravity: a,
+            stiffness_factor: b,
+            timestep: c,
+            steps: counts[3],
+            largest_overlap: d,
+            sank: e,
+            rest: RestMeasures {
+                kinetic: f,
+                unbalanced: g,
+                acceleration: h,
+                time: i,
+            },
+        }
+    }
 }
 
 /// What a stage runs with.
@@ -168,6 +249,42 @@ struct Chosen {
 }
 
 impl Stages {
+    /// The grains under the first stage's laws, no step made.
+    fn start(
+        &self,
+        mut setup: Setup,
+        clumps: &[Clump],
+        down: &Vector3<f64>,
+    ) -> Result<Simulation, SetupError> {
+        setup.gravity = down * self.gravities[0];
+        setup.law = self.choose(&setup.law, &setup.grains, setup.gravity)?.laws;
+        // Any will do: each stage sets its own before a step is made.
+        setup.timestep = 1.0;
+        let mut simulation = Simulation::new(setup)?;
+        if !clumps.is_empty() {
+            simulation.clump(clumps)?;
+        }
+        Ok(simulation)
+    }
+
+    /// Goes on to the stage of a gravity.
+    fn begin(
+        &self,
+        simulation: &mut Simulation,
+        laws: &Laws,
+        (down, g): (&Vector3<f64>, f64),
+    ) -> Result<Begun, SetupError> {
+        let grains = simulation.grain_list();
+        let chosen = self.choose(laws, &grains, down * g)?;
+        let step = simulation.choose_step(&chosen.laws, &chosen.conditions, &self.shares())?;
+        simulation.go_on_under(&chosen.laws, down * g, step)?;
+        Ok(Begun {
+            factor: chosen.factor,
+            step,
+            before: height(simulation, down),
+        })
+    }
+
     fn choose(
         &self,
         laws: &Laws,

@@ -4,6 +4,6 @@ mod beds;
 mod changes;
 mod impacts;
 mod motion;
-mod packings;
+pub mod packings;
 mod scene;
 mod slopes;

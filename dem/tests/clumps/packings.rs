@@ -18,13 +18,12 @@ fn tube() -> Vec<Wall> {
     ]
 }
 
-/// Jacks poured into it.
-fn poured() -> (Simulation, PouringReport) {
+/// What jacks are poured into, and how.
+pub fn pouring() -> (Setup, ClumpPouring, Relaxation) {
     let shape = shape();
     let mut setup = setup(rough(), Vec::new(), 2e-5);
     setup.gravity = v(0.0, 0.0, -9.81);
     setup.walls = tube();
-    let mut bed = Simulation::new(setup).unwrap();
     let spec = ClumpPouring {
         source: Region::All(vec![
             Region::Cylinder {
@@ -49,9 +48,15 @@ fn poured() -> (Simulation, PouringReport) {
         kinetic: 1e-5,
         unbalanced: 0.05,
     };
-    let report = pour_clumps(&mut bed, &spec, &relaxation, &mut |_| {
-        ControlFlow::Continue(())
-    });
+    (setup, spec, relaxation)
+}
+
+/// Jacks poured into it.
+fn poured() -> (Simulation, PouringReport) {
+    let (setup, spec, relaxation) = pouring();
+    let mut bed = Simulation::new(setup).unwrap();
+    let mut go = |_: &RestMeasures| ControlFlow::Continue(());
+    let report = pour_clumps(&mut bed, &spec, &relaxation, &mut go);
     (bed, report.unwrap())
 }
 

@@ -19,10 +19,9 @@ use crate::scene::world::Materials;
 use crate::scene::{AngleOfReposeScene, layers};
 use crate::summary::{Figure, Quantity, Summary};
 use crate::table::Table;
-use colluvium_dem::preparation::{InclineBed, Packing, settle_incline_bed};
+use colluvium_dem::preparation::{InclineBed, Midway, Packing, Watch, settle_incline_bed_from};
 use colluvium_dem::{ContactLaw, Grain, Rolling, SetupError, Simulation, Snapshot, Tangential};
 use nalgebra::Vector3;
-use std::ops::ControlFlow;
 
 /// Mean velocity of an avalanche at its end, over √(g d).
 const STOPPED: f64 = 0.01;
@@ -252,41 +251,43 @@ impl Recipe for AngleOfReposeScene {
             timestep: step,
             seed: self.seed,
         };
-        let stopped = &mut |_| {
-            if crate::interruption::requested() {
-                ControlFlow::Break(())
-            } else {
-                ControlFlow::Continue(())
-            }
-        };
-        let bed =
-            settle_incline_bed(&spec, shop.threads, stopped).map_err(|error| match error {
-                SetupError::Diverged(_) | SetupError::Interrupted => {
+        shop.kept_step(|shop, step| {
+            let state = step.goes_on().map(|midway| &midway.record);
+            let look = &mut |_, simulation: &mut Simulation| {
+                step.pass(|| Midway {
+                    record: simulation.checkpoint(),
+                    loops: Vec::new(),
+                })
+            };
+            let bed = settle_incline_bed_from(state, &spec, shop.threads, look);
+            let bed = bed.map_err(|error| match error {
+                SetupError::Diverged(_) | SetupError::Interrupted | SetupError::Record(_) => {
                     Failure::Run(error.to_string())
                 }
                 error => Failure::Input(format!("preparation: {error}")),
             })?;
-        shop.packing = Packing {
-            domain: bed.domain,
-            grains: bed.grains,
-            contacts: Vec::new(),
-            clumps: Vec::new(),
-        };
-        shop.grain_steps += bed.report.grain_steps;
-        shop.note(
-            "bed",
-            format!(
-                "{} grains over {} that stick to the floor, depth {:.4e} m, solid fraction {:.4}, {:.2} contacts a grain, kinetic \
-                 energy {:.1e} m g d a grain",
-                bed.report.grains,
-                bed.report.base_grains,
-                bed.report.depth,
-                bed.report.solid_fraction,
-                bed.report.coordination,
-                bed.report.kinetic_energy
-            ),
-        );
-        Ok(())
+            shop.packing = Packing {
+                domain: bed.domain,
+                grains: bed.grains,
+                contacts: Vec::new(),
+                clumps: Vec::new(),
+            };
+            shop.grain_steps += bed.report.grain_steps;
+            shop.note(
+                "bed",
+                format!(
+                    "{} grains over {} that stick to the floor, depth {:.4e} m, solid fraction {:.4}, {:.2} contacts a grain, kinetic \
+                     energy {:.1e} m g d a grain",
+                    bed.report.grains,
+                    bed.report.base_grains,
+                    bed.report.depth,
+                    bed.report.solid_fraction,
+                    bed.report.coordination,
+                    bed.report.kinetic_energy
+                ),
+            );
+            Ok(())
+        })
     }
 
     fn world(&self, _: &Packing, materials: &Materials, _: &str) -> Result<World, Failure> {

@@ -13,6 +13,7 @@ pub mod build;
 pub mod course;
 pub mod fragments;
 pub mod history;
+pub mod kept_steps;
 pub mod live_averages;
 pub mod packing_file;
 pub mod pictures;

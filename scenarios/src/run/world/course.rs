@@ -2,12 +2,14 @@
 
 use super::build::Stand;
 use super::history::History;
+use super::kept_steps::{self, Keeper};
 use super::live_averages::LiveAverages;
 use super::packing_file::{self, Stored};
 use super::pictures::Pictures;
 use super::recipe::{Course, Recipe};
 use super::store;
 use super::workshop::{Workshop, stand_ins};
+use crate::checkpoint::Checkpoint;
 use crate::cost::Cost;
 use crate::failure::Failure;
 use crate::frames::Frames;
@@ -20,9 +22,8 @@ use crate::scene::Scene;
 use crate::scene::world::{Materials, Place};
 use crate::summary::{Model, Quantity, Summary};
 use crate::table::Table;
-use colluvium_dem::preparation::{Coordination, HELD_BY_FRICTION, Packing, RestMeasures};
+use colluvium_dem::preparation::{Coordination, HELD_BY_FRICTION, Packing};
 use colluvium_dem::{Record, SetupError, Shape, Simulation, Snapshot, Threads};
-use std::ops::ControlFlow;
 use std::time::Instant;
 
 /// Steps between two looks at the clock.
@@ -98,6 +99,8 @@ fn packing(
 ) -> Result<(Stored, bool), Failure> {
     let own = under.directory.file(run_directory::PACKING);
     if own.exists() {
+        // Killed before the run itself was saved.
+        kept_steps::take_midway(under);
         let stored = packing_file::read(&own).map_err(|why| {
             Failure::Input(format!(
                 "--resume: {} cannot be used: {why}; nothing was changed",
@@ -115,8 +118,13 @@ fn packing(
         return Ok((stored, false));
     }
     under.begin()?;
-    let stored = make(recipe, materials, under)?;
+    let midway = kept_steps::take_midway(under);
+    let stored = make(recipe, materials, (under, midway))?;
     packing_file::write(&own, &under.scene.name, &stored)?;
+    if let Err(error) = kept_steps::remove(under.directory.path()) {
+        let note = format!("finished steps of the preparation are still there: {error}");
+        under.directory.journal.note(&note);
+    }
     if let Some(path) = store::keep(recipe, &under.scene.name, &stored)? {
         let kept = format!("packing kept as {}", path.display());
         under.directory.journal.note(&kept);
@@ -124,29 +132,21 @@ fn packing(
     Ok((stored, false))
 }
 
-fn make(recipe: &dyn Recipe, materials: &Materials, under: &Under) -> Result<Stored, Failure> {
-    let bar = Bar::new("preparation");
-    let mut watch = |rest: &RestMeasures| {
-        bar.say(&rest.to_string());
-        if crate::interruption::requested() {
-            return ControlFlow::Break(());
-        }
-        ControlFlow::Continue(())
-    };
-    let seed = recipe.keys().seed;
-    let keys = (seed, recipe.keys().step.preparation);
+fn make(
+    recipe: &dyn Recipe,
+    materials: &Materials,
+    (under, midway): (&Under, Option<Checkpoint>),
+) -> Result<Stored, Failure> {
+    let keeper = Keeper::new(under, &materials.names, midway)?;
+    let keys = (recipe.keys().seed, recipe.keys().step.preparation);
     let threads = under.threads_of_one_run();
-    let shop = Workshop::new(materials, keys, threads, &mut watch);
-    let mut shop = shop.tell(&under.directory.journal);
+    let mut shop = Workshop::new(materials, keys, threads, &keeper);
     let made = recipe.prepare(&mut shop, &under.scene.origin);
     if made.is_ok() {
         shop.compare_sizes();
     }
     let (packing, notes, grain_steps) = (shop.packing, shop.notes, shop.grain_steps);
-    bar.clear();
-    if crate::interruption::requested() {
-        return Err(under.interrupted());
-    }
+    keeper.end()?;
     made?;
     Ok(Stored {
         packing,

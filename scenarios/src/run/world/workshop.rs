@@ -10,18 +10,19 @@ mod surroundings;
 
 pub use surroundings::{Surroundings, open_space, softened, stand_ins, step_for, with_friction};
 
+use super::kept_steps::{Keeper, Step};
+use super::packing_file::Stored;
 use crate::failure::Failure;
-use crate::journal::Journal;
 use crate::scene::world::Materials;
 use crate::summary::Note;
 use colluvium_dem::preparation::{
-    Aggregate, Amount, CentralCompaction, Insertion, Jamming, Packing, Pouring, Relaxation,
-    RestMeasures, Stages, TRIES, compact, grow, insert_loose, jam, pour, relax, settle_in_stages,
+    Aggregate, Amount, CentralCompaction, Insertion, Jamming, Midway, Packing, Pouring, Relaxation,
+    Stages, TRIES, Watch, compact, grow, insert_loose, jam, pour, relax, settle_in_stages,
 };
 use colluvium_dem::timestep::{Conditions, Shares};
 use colluvium_dem::{BoxMotion, Edge, Grain, Laws, Region, Setup, SetupError, Simulation, Threads};
 use nalgebra::Vector3;
-use std::ops::ControlFlow;
+use std::time::Instant;
 
 /// A packing in the making.
 pub struct Workshop<'a> {
@@ -41,8 +42,9 @@ pub struct Workshop<'a> {
     pub threads: Threads,
     /// Grains that are still to come and must find a step that does for them, too: those of a clump.
     coming: Vec<Grain>,
-    journal: Option<&'a Journal>,
-    watch: &'a mut dyn FnMut(&RestMeasures) -> ControlFlow<()>,
+    /// Steps that may take long, so far.
+    steps: u64,
+    keeper: &'a Keeper<'a>,
 }
 
 /// How a periodic box is shrunk, or widened, about its centre.
@@ -60,7 +62,7 @@ impl<'a> Workshop<'a> {
         materials: &'a Materials,
         (seed, safety): (u64, f64),
         threads: Threads,
-        watch: &'a mut dyn FnMut(&RestMeasures) -> ControlFlow<()>,
+        keeper: &'a Keeper<'a>,
     ) -> Workshop<'a> {
         Workshop {
             packing: Packing {
@@ -76,15 +78,44 @@ impl<'a> Workshop<'a> {
             seed,
             safety,
             threads,
-            journal: None,
-            watch,
+            steps: 0,
+            keeper,
         }
     }
 
-    /// Notes go into a journal as they come.
-    pub fn tell(mut self, journal: &'a Journal) -> Workshop<'a> {
-        self.journal = Some(journal);
-        self
+    /// Does a step that may take long, from where it was stopped if it was.
+    pub fn step<T>(
+        &mut self,
+        work: impl FnOnce(&mut Self, &mut Step) -> Result<T, Failure>,
+    ) -> Result<T, Failure> {
+        let number = self.steps;
+        self.steps += 1;
+        work(self, &mut self.keeper.step(number))
+    }
+
+    /// Does a step that changes the packing, adds its notes and grain-steps, and gives nothing else: what it came to is kept if
+    /// it took long, and taken from there if the run was stopped later.
+    pub fn kept_step(
+        &mut self,
+        work: impl FnOnce(&mut Self, &mut Step) -> Result<(), Failure>,
+    ) -> Result<(), Failure> {
+        let number = self.steps;
+        if let Some(stored) = self.keeper.outcome(number)? {
+            self.steps += 1;
+            self.packing = stored.packing;
+            self.notes.extend(stored.notes);
+            self.grain_steps += stored.grain_steps;
+            return Ok(());
+        }
+        let (began, noted, paid) = (Instant::now(), self.notes.len(), self.grain_steps);
+        self.step(work)?;
+        self.keeper.keep(number, began, || Stored {
+            packing: self.packing.clone(),
+            materials: self.materials.names.clone(),
+            provenance: toml::Table::new(),
+            notes: self.notes[noted..].to_vec(),
+            grain_steps: self.grain_steps - paid,
+        })
     }
 
     /// Writes down what a step achieved.
@@ -93,14 +124,30 @@ impl<'a> Workshop<'a> {
             step: step.to_owned(),
             text: text.to_string(),
         };
-        if let Some(journal) = self.journal {
-            journal.note(&format!("{step}: {}", note.text.replace('\n', "; ")));
-        }
+        let line = format!("{step}: {}", note.text.replace('\n', "; "));
+        self.keeper.journal().note(&line);
         self.notes.push(note);
     }
 
     /// The packing among its surroundings, at rest or as it moves.
     pub fn simulation(&self, around: &Surroundings) -> Result<Simulation, Failure> {
+        let mut simulation = Simulation::new(self.setup(around)?).map_err(refused)?;
+        if !self.packing.clumps.is_empty() {
+            simulation.clump(&self.packing.clumps).map_err(refused)?;
+        }
+        Ok(simulation)
+    }
+
+    /// The same for a step, as it was when it was stopped if it was.
+    fn simulation_of(&self, around: &Surroundings, step: &Step) -> Result<Simulation, Failure> {
+        match step.goes_on() {
+            Some(midway) => Simulation::resume(self.setup(around)?, &midway.record)
+                .map_err(|error| Failure::Run(format!("--resume: preparation: {error}"))),
+            None => self.simulation(around),
+        }
+    }
+
+    fn setup(&self, around: &Surroundings) -> Result<Setup, Failure> {
         let mut setup = Setup {
             domain: self.packing.domain,
             gravity: around.gravity,
@@ -131,11 +178,7 @@ impl<'a> Workshop<'a> {
             .choose_step(&conditions, &shares)
             .map_err(refused)?
             .seconds;
-        let mut simulation = Simulation::new(setup).map_err(refused)?;
-        if !self.packing.clumps.is_empty() {
-            simulation.clump(&self.packing.clumps).map_err(refused)?;
-        }
-        Ok(simulation)
+        Ok(setup)
     }
 
     /// The smallest and the largest grain of each kind, at the origin: what limits are taken from where
@@ -195,20 +238,24 @@ impl<'a> Workshop<'a> {
             fill: colluvium_dem::preparation::FILL,
             seed: self.seed,
         };
-        let mut simulation = self.simulation(around)?;
-        let report = pour(&mut simulation, &spec, relaxation, self.watch).map_err(ended)?;
-        self.take(simulation);
-        self.note("pour", report);
-        Ok(())
+        self.kept_step(|shop, step| {
+            let mut simulation = shop.simulation_of(around, step)?;
+            let report = pour(&mut simulation, &spec, relaxation, step).map_err(ended)?;
+            shop.take(simulation);
+            shop.note("pour", report);
+            Ok(())
+        })
     }
 
     /// Lets everything come to rest.
     pub fn relax(&mut self, around: &Surroundings, spec: &Relaxation) -> Result<(), Failure> {
-        let mut simulation = self.simulation(around)?;
-        let rest = relax(&mut simulation, spec, self.watch).map_err(ended)?;
-        self.take(simulation);
-        self.note("relax", rest);
-        Ok(())
+        self.kept_step(|shop, step| {
+            let mut simulation = shop.simulation_of(around, step)?;
+            let rest = relax(&mut simulation, spec, step).map_err(ended)?;
+            shop.take(simulation);
+            shop.note("relax", rest);
+            Ok(())
+        })
     }
 
     /// Lets everything come to rest as far as it does in the time; says whether it does.
@@ -217,30 +264,29 @@ impl<'a> Workshop<'a> {
         around: &Surroundings,
         spec: &Relaxation,
     ) -> Result<bool, Failure> {
-        let mut simulation = self.simulation(around)?;
-        let (rests, rest) = match relax(&mut simulation, spec, self.watch) {
-            Ok(rest) => (true, rest),
-            Err(SetupError::Restless { measures, .. }) => (false, *measures),
-            Err(error) => return Err(ended(error)),
-        };
-        self.take(simulation);
-        self.note("relax", rest);
-        Ok(rests)
+        self.step(|shop, step| {
+            let mut simulation = shop.simulation_of(around, step)?;
+            let (rests, rest) = match relax(&mut simulation, spec, step) {
+                Ok(rest) => (true, rest),
+                Err(SetupError::Restless { measures, .. }) => (false, *measures),
+                Err(error) => return Err(ended(error)),
+            };
+            shop.take(simulation);
+            shop.note("relax", rest);
+            Ok(rests)
+        })
     }
 
     /// Lets the grains go for a time (s), and stops what still moves.
     pub fn let_go(&mut self, around: &Surroundings, time: f64) -> Result<(), Failure> {
-        let mut simulation = self.simulation(around)?;
-        let steps = (time / simulation.timestep()).ceil() as u64;
-        simulation
-            .advance(steps)
-            .map_err(|error| Failure::Run(format!("preparation: {error}")))?;
-        simulation.damp(0.0);
-        self.take(simulation);
-        if crate::interruption::requested() {
-            return Err(ended(SetupError::Interrupted));
-        }
-        Ok(())
+        self.kept_step(|shop, step| {
+            let mut simulation = shop.simulation_of(around, step)?;
+            let steps = (time / simulation.timestep()).ceil() as u64;
+            advance_to(&mut simulation, steps, step)?;
+            simulation.damp(0.0);
+            shop.take(simulation);
+            Ok(())
+        })
     }
 
     /// Pulls a cloud to a point until it is dense enough.
@@ -249,11 +295,13 @@ impl<'a> Workshop<'a> {
         around: &Surroundings,
         spec: &CentralCompaction,
     ) -> Result<(), Failure> {
-        let mut simulation = self.simulation(around)?;
-        let report = compact(&mut simulation, spec, self.watch).map_err(ended)?;
-        self.take(simulation);
-        self.note("compact", report);
-        Ok(())
+        self.kept_step(|shop, step| {
+            let mut simulation = shop.simulation_of(around, step)?;
+            let report = compact(&mut simulation, spec, step).map_err(ended)?;
+            shop.take(simulation);
+            shop.note("compact", report);
+            Ok(())
+        })
     }
 
     /// Lets everything come to rest under one gravity after the other.
@@ -268,15 +316,17 @@ impl<'a> Workshop<'a> {
             timestep: 1.0,
             threads: self.threads,
         };
-        let (mut simulation, reports) =
-            settle_in_stages(setup, &self.packing.clumps, stages, self.watch).map_err(ended)?;
-        let grains = simulation.grain_count() as u64;
-        for report in reports {
-            self.grain_steps += report.steps * grains;
-            self.note("stage", report);
-        }
-        self.packing = Packing::of(&mut simulation);
-        Ok(())
+        self.kept_step(|shop, step| {
+            let (mut simulation, reports) =
+                settle_in_stages(setup, &shop.packing.clumps, stages, step).map_err(ended)?;
+            let grains = simulation.grain_count() as u64;
+            for report in reports {
+                shop.grain_steps += report.steps * grains;
+                shop.note("stage", report);
+            }
+            shop.packing = Packing::of(&mut simulation);
+            Ok(())
+        })
     }
 
     /// Makes a jammed packing in a periodic cube.
@@ -288,10 +338,12 @@ impl<'a> Workshop<'a> {
             overlap: 1e-4,
             seed: self.seed,
         };
-        let (packing, report) = jam(&spec, self.watch).map_err(ended)?;
-        self.packing = packing;
-        self.note("jam", report);
-        Ok(())
+        self.kept_step(|shop, step| {
+            let (packing, report) = jam(&spec, step).map_err(ended)?;
+            shop.packing = packing;
+            shop.note("jam", report);
+            Ok(())
+        })
     }
 
     /// Grows a ballistic aggregate about the origin, of the first kind of grains.
@@ -320,52 +372,65 @@ impl<'a> Workshop<'a> {
             speed: 2.0 * (1.0 - factor).abs() * lengths.max() / spec.time,
             ..Surroundings::none(laws.clone())
         };
-        let mut simulation = self.simulation(&around)?;
-        simulation
-            .set_box_motion(BoxMotion::Stretch {
-                edges: [edge(0), edge(1), edge(2)],
-                carry: true,
-            })
-            .map_err(refused)?;
-        let steps = (spec.time / simulation.timestep()).ceil() as u64 + 1;
-        let look = (steps / 200).max(1);
-        while simulation.steps_done() < steps {
-            simulation
-                .advance(look.min(steps - simulation.steps_done()))
-                .map_err(|error| Failure::Run(format!("preparation: {error}")))?;
-            if (self.watch)(&simulation.rest_measures(relaxation.acceleration)).is_break() {
-                return Err(ended(SetupError::Interrupted));
+        self.kept_step(|shop, step| {
+            let mut simulation = shop.simulation_of(&around, step)?;
+            if step.goes_on().is_none() {
+                simulation
+                    .set_box_motion(BoxMotion::Stretch {
+                        edges: [edge(0), edge(1), edge(2)],
+                        carry: true,
+                    })
+                    .map_err(refused)?;
             }
-        }
-        simulation
-            .set_box_motion(BoxMotion::Rest)
-            .map_err(refused)?;
-        let rest = relax(&mut simulation, relaxation, self.watch).map_err(ended)?;
-        self.take(simulation);
-        let reached = solid / self.packing.domain.lengths().product();
-        self.note(
-            "squeeze",
-            format!(
-                "solid fraction {before:.4} to {reached:.4} ({:.4} asked for) in {:.3e} s by a box that shrinks about \
-                 its centre; {rest}",
-                spec.solid_fraction, spec.time
-            ),
-        );
-        Ok(())
+            // Loops are those of the rest that follows.
+            if step.goes_on().is_none_or(|midway| midway.loops.is_empty()) {
+                let steps = (spec.time / simulation.timestep()).ceil() as u64 + 1;
+                advance_to(&mut simulation, steps, step)?;
+                simulation
+                    .set_box_motion(BoxMotion::Rest)
+                    .map_err(refused)?;
+            }
+            let rest = relax(&mut simulation, relaxation, step).map_err(ended)?;
+            shop.take(simulation);
+            let reached = solid / shop.packing.domain.lengths().product();
+            shop.note(
+                "squeeze",
+                format!(
+                    "solid fraction {before:.4} to {reached:.4} ({:.4} asked for) in {:.3e} s by a box that shrinks about \
+                     its centre; {rest}",
+                    spec.solid_fraction, spec.time
+                ),
+            );
+            Ok(())
+        })
     }
+}
+
+/// Steps between two looks of a step that counts its steps.
+const STEPS_PER_LOOK: u64 = 100;
+
+/// Goes on until so many steps are done.
+fn advance_to(simulation: &mut Simulation, steps: u64, step: &Step) -> Result<(), Failure> {
+    while simulation.steps_done() < steps {
+        simulation
+            .advance(STEPS_PER_LOOK.min(steps - simulation.steps_done()))
+            .map_err(|error| Failure::Run(format!("preparation: {error}")))?;
+        let state = || Midway {
+            record: simulation.checkpoint(),
+            loops: Vec::new(),
+        };
+        if step.pass(state).is_break() {
+            return Err(ended(SetupError::Interrupted));
+        }
+    }
+    Ok(())
 }
 
 fn refused(error: SetupError) -> Failure {
     Failure::Input(format!("preparation: {error}"))
 }
 
-/// What ends a preparation that had begun.
+/// What ends a preparation that had begun; why one was interrupted its keeper knows.
 fn ended(error: SetupError) -> Failure {
-    match error {
-        SetupError::Interrupted => Failure::Run(INTERRUPTED.into()),
-        error => Failure::Run(error.to_string()),
-    }
+    Failure::Run(error.to_string())
 }
-
-/// The message by which the caller knows that the user stopped a preparation.
-pub const INTERRUPTED: &str = "preparation was interrupted";

@@ -51,17 +51,23 @@ impl Workshop<'_> {
             fill: FILL,
             seed: self.seed,
         };
-        let mut simulation = self.simulation(around)?;
-        let report = pour_clumps(&mut simulation, &spec, relaxation, self.watch).map_err(ended)?;
-        self.take(simulation);
-        let balls = self.coming.drain(..).count();
-        self.note(
-            "pour",
-            format!(
-                "{count} clumps of {balls} balls poured in {} batches, {:.3e} s apart; {}",
-                report.batches, report.interval, report.rest
-            ),
-        );
-        Ok(())
+        let poured = self.kept_step(|shop, step| {
+            let mut simulation = shop.simulation_of(around, step)?;
+            let report = pour_clumps(&mut simulation, &spec, relaxation, step).map_err(ended)?;
+            shop.take(simulation);
+            shop.note(
+                "pour",
+                format!(
+                    "{count} clumps of {} balls poured in {} batches, {:.3e} s apart; {}",
+                    spec.shape.balls.len(),
+                    report.batches,
+                    report.interval,
+                    report.rest
+                ),
+            );
+            Ok(())
+        });
+        self.coming.clear();
+        poured
     }
 }
