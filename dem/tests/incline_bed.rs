@@ -91,7 +91,7 @@ fn a_bed_that_is_stopped_settles_on_to_the_same_bits() {
         ControlFlow::Continue(())
     })
     .unwrap();
-    for stop_at in [1, looks / 3, looks] {
+    for stop_at in [1, 2 * looks / 3] {
         let (mut seen, mut state) = (0, None);
         let error = settle_incline_bed_from(None, &spec, Threads::Serial, &mut |_, simulation| {
             seen += 1;

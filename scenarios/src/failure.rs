@@ -69,6 +69,11 @@ impl Resumes {
 }
 
 impl Failure {
+    /// A checkpoint that cannot be gone on from.
+    pub fn damaged(why: &str) -> Failure {
+        Failure::Input(format!("--resume: the checkpoint is damaged: {why}"))
+    }
+
     /// The same failure once work has been done: no longer bad input with nothing written.
     pub fn after_work(self) -> Failure {
         match self {

@@ -58,7 +58,7 @@ use crate::summary::{Status, Summary};
 use crate::table::Table;
 pub use angle_of_repose::PUBLISHED_ANGLES;
 use colluvium_dem::{Record, Threads};
-use std::cell::RefCell;
+use std::cell::{Cell, RefCell};
 use std::path::PathBuf;
 use std::time::{Duration, Instant};
 
@@ -121,7 +121,7 @@ pub struct Under<'a> {
     saving: RefCell<Saving>,
     given_pause: Option<Duration>,
     /// Whether the state is there and work may begin: until then a resumed run writes nothing.
-    begun: bool,
+    begun: Cell<bool>,
 }
 
 /// When checkpoints are written, and where.
@@ -150,11 +150,13 @@ impl Under<'_> {
 
     /// Says that the start, or the state to go on from, was accepted: from here on the directory is
     /// this run's, and a failure is one of the run and not of the input.
-    pub fn begin(&mut self) -> Result<(), Failure> {
+    pub fn begin(&self) -> Result<(), Failure> {
+        if self.begun.replace(true) {
+            return Ok(());
+        }
         if self.resumed.is_some() {
             self.directory.journal.note("resumed");
         }
-        self.begun = true;
         self.directory.mark_running()
     }
 
@@ -323,7 +325,7 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> {
             pause: options.checkpoint_every.unwrap_or(CHECKPOINT_EVERY),
         }),
         given_pause: options.checkpoint_every,
-        begun: false,
+        begun: Cell::new(false),
     };
     let found = pool(threads).and_then(|pool| {
         pool.install(|| match &scene.body {
@@ -346,7 +348,7 @@ pub fn run(scene: &Scene, options: &RunOptions) -> Result<Ended, Failure> {
             SceneBody::SiloDischarge(body) => silo_discharge::run(body, &mut under),
         })
     });
-    let (begun, wall_s, going_on) = (under.begun, under.wall_s(), under.resumed.is_some());
+    let (begun, wall_s, going_on) = (under.begun.get(), under.wall_s(), under.resumed.is_some());
     match found.and_then(|findings| finish(scene, &directory, findings)) {
         Ok(()) => Ok(Ended {
             directory: directory.path().to_owned(),

@@ -2,7 +2,7 @@
 
 use crate::command::{
     CORE, FRONT_ON_A_SLOPE, INSTALMENTS, INTERVAL, MOVING_EDGE, SMALL_COMET_CLIFF, SMALL_HYBRID,
-    SMALL_JOINED_COLUMN, colluvium, hash, pause, succeed, table,
+    SMALL_JOINED_COLUMN, colluvium, hash, pause, succeed, summary, table,
 };
 use crate::packings::{COMET_CLIFF, JOINED_COLUMN, Kept, WIDE_COLUMN};
 use rand::{RngExt, SeedableRng};
@@ -73,6 +73,9 @@ fn killed_and_whole(
     let folder = tempfile::tempdir().unwrap();
     if let Some(packing) = packing {
         packing.put(folder.path());
+    }
+    if scene == OWN_FILE {
+        std::fs::write(folder.path().join(OWN_FILE), PREPARED).unwrap();
     }
     let arguments = |out: &'static str, more: &[&'static str]| {
         let mut list = vec!["run", scene, "--out", out];
@@ -153,6 +156,115 @@ fn killed_and_whole(
         "something was left behind"
     );
     folder
+}
+
+const OWN_FILE: &str = "own.toml";
+
+/// A scene of preparation: grains inserted, at rest, more poured on them, gravity that falls in stages.
+const PREPARED: &str = r#"
+scene = "grains"
+seed = 5
+duration = 1.0e-3
+output = { rows = 2, pictures = 0 }
+
+[contact]
+normal = "hertz"
+youngs_modulus = 1.0e6
+poissons_ratio = 0.3
+restitution = 0.4
+friction = 0.4
+
+[grains.ball]
+density = 1000.0
+sizes = { law = "uniform", smallest = 4.0e-3, largest = 5.0e-3 }
+
+[gravity]
+uniform = [0.0, 0.0, -9.81]
+
+[walls.floor]
+shape = "plane"
+axis = [0.0, 0.0, 1.0]
+
+[walls.tube]
+shape = "cylinder"
+axis = [0.0, 0.0, 1.0]
+radius = 0.03
+
+[[prepare]]
+do = "insert"
+count = 150
+within = [{ shape = "cylinder", axis = [0.0, 0.0, 1.0], point = [0.0, 0.0, 0.0], radius = 0.029 }, { shape = "block", lower = [-1.0, -1.0, 0.0], upper = [1.0, 1.0, 0.1] }]
+
+[[prepare]]
+do = "relax"
+
+[[prepare]]
+do = "pour"
+count = 100
+within = [{ shape = "cylinder", axis = [0.0, 0.0, 1.0], point = [0.0, 0.0, 0.0], radius = 0.029 }, { shape = "block", lower = [-1.0, -1.0, 0.08], upper = [1.0, 1.0, 0.15] }]
+
+[[prepare]]
+do = "stages"
+gravities = [9.81, 1.0e-1]
+"#;
+
+#[test]
+fn a_killed_preparation_goes_on() {
+    let folder = killed_and_whole(None, (OWN_FILE, &[]), 31, 5);
+    let log =
+        |name: &str| std::fs::read_to_string(folder.path().join(name).join("log.txt")).unwrap();
+    let times = |text: &str| log("parts").matches(text).count();
+    let (again, begun) = (times("goes on"), times("was done before"));
+    assert!(again > 0 && begun > 0, "{}", log("parts"));
+    assert_eq!(log("whole").matches("goes on").count(), 0);
+    let prepared = |name: &str| summary(&folder.path().join(name))["preparation"].clone();
+    assert_eq!(prepared("parts"), prepared("whole"));
+    let steps = |name: &str| summary(&folder.path().join(name))["cost"]["grain_steps"].clone();
+    assert_eq!(steps("parts"), steps("whole"));
+}
+
+/// Ctrl-C in a step, at its first looks and late, and what the messages say; a state of another preparation, and one that is cut,
+/// are refused and kept.
+#[test]
+fn a_preparation_that_is_stopped_says_how_to_go_on() {
+    let folder = tempfile::tempdir().unwrap();
+    let at = folder.path();
+    std::fs::write(at.join(OWN_FILE), PREPARED).unwrap();
+    let run = ["run", OWN_FILE, "--out", "parts", "--threads", "1"];
+    let mut child = Command::new(env!("CARGO_BIN_EXE_colluvium"))
+        .args(run)
+        .current_dir(at)
+        .stdout(Stdio::null())
+        .stderr(Stdio::piped())
+        .spawn()
+        .unwrap();
+    let parts = at.join("parts");
+    let log = || std::fs::read_to_string(parts.join("log.txt")).unwrap_or_default();
+    let begin = Instant::now();
+    // The first step that takes its time is under way.
+    while !log().contains("insert:") && begin.elapsed() < PATIENCE {
+        pause();
+    }
+    let id = child.id().to_string();
+    Command::new("kill").args(["-INT", &id]).status().unwrap();
+    let ended = child.wait_with_output().unwrap();
+    assert_eq!(ended.status.code(), Some(130));
+    let message = String::from_utf8_lossy(&ended.stderr).into_owned();
+    assert!(message.contains("goes on from what was saved"), "{message}");
+    assert_eq!(summary(&parts)["status"], "interrupted");
+
+    let saved = std::fs::read(parts.join("checkpoint.h5")).unwrap();
+    let resume = [&run[..], &["--resume"]].concat();
+    std::fs::write(parts.join("checkpoint.h5"), &saved[..saved.len() / 2]).unwrap();
+    let refused = colluvium(at, &resume);
+    assert_eq!(refused.status.code(), Some(2), "{refused:?}");
+    assert_eq!(summary(&parts)["status"], "interrupted");
+    std::fs::write(parts.join("checkpoint.h5"), &saved).unwrap();
+    succeed(at, &resume);
+    assert!(log().contains("preparation: step 0 goes on"), "{}", log());
+    succeed(at, &["run", OWN_FILE, "--out", "whole"]);
+    assert_eq!(hash(&parts), hash(&at.join("whole")));
+    assert!(!parts.join("preparation").exists() && !parts.join("checkpoint.h5").exists());
 }
 
 #[test]

@@ -261,7 +261,8 @@ impl Recipe for AngleOfReposeScene {
             };
             let bed = settle_incline_bed_from(state, &spec, shop.threads, look);
             let bed = bed.map_err(|error| match error {
-                SetupError::Diverged(_) | SetupError::Interrupted | SetupError::Record(_) => {
+                SetupError::Record(why) => Failure::damaged(&why),
+                SetupError::Diverged(_) | SetupError::Interrupted => {
                     Failure::Run(error.to_string())
                 }
                 error => Failure::Input(format!("preparation: {error}")),

@@ -3,6 +3,7 @@
 use super::impact::shape;
 use super::step;
 use super::{Findings, Under};
+use crate::checkpoint::Checkpoint;
 use crate::cost::Cost;
 use crate::failure::Failure;
 use crate::interruption;
@@ -14,9 +15,13 @@ use colluvium_coupling::coarse_graining::{Estimate, Profile, ProfileRow};
 use colluvium_coupling::incline::{
     InclineError, InclineResult, InclineRun, InclineSpec, Outcome, Purpose, SeriesPoint, Start,
 };
-use colluvium_dem::preparation::{Bed, InclineBed, RadiusLaw, settle_incline_bed};
+use colluvium_dem::preparation::{
+    Bed, InclineBed, RadiusLaw, settle_incline_bed, settle_incline_bed_from,
+};
 use colluvium_dem::timestep::{self, Choice, Conditions, Shares};
-use colluvium_dem::{ContactLaw, Grain, Hooke, SetupError, Snapshot, TangentialSpring, Threads};
+use colluvium_dem::{
+    ContactLaw, Grain, Hooke, SetupError, Simulation, Snapshot, TangentialSpring, Threads,
+};
 use nalgebra::Vector3;
 use std::ops::ControlFlow;
 
@@ -142,26 +147,73 @@ pub fn spec(scene: &InclineScene, bed: &Bed, threads: Threads) -> InclineSpec {
     }
 }
 
+/// Stage of a checkpoint in which the bed settles.
+const SETTLING: &str = "bed";
+
 /// Lets a bed settle; gives nothing if the user stopped it.
 pub fn settle(bed: &InclineBed, threads: Threads, bar: &Bar) -> Result<Option<Bed>, Failure> {
-    let settled = settle_incline_bed(bed, threads, &mut |share| {
+    bed_or_stopped(settle_incline_bed(bed, threads, &mut |share| {
         bar.set(share);
         if interruption::requested() {
             ControlFlow::Break(())
         } else {
             ControlFlow::Continue(())
         }
-    });
-    match settled {
+    }))
+}
+
+/// Lets the bed of a run settle, from where it was stopped if it was. For a run that goes on from a later state it settles anew:
+/// the same seed gives the same bits.
+pub fn settle_of_run(bed: &InclineBed, under: &mut Under, bar: &Bar) -> Result<Bed, Failure> {
+    let settling = |saved: &Checkpoint| saved.stage == SETTLING;
+    let flows = under.resumed.as_ref().is_some_and(|saved| !settling(saved));
+    if under.resumed.is_none() {
+        under.begin()?;
+    }
+    let state = under.resumed.take_if(|saved| settling(saved));
+    let state = state.as_ref().map(|saved| &saved.record);
+    let mut failure = None;
+    let mut pass = |share, simulation: &mut Simulation| {
+        bar.set(share);
+        let passed = match (flows, interruption::requested()) {
+            (true, true) => Err(under.interrupted()),
+            (true, false) => Ok(()),
+            (false, _) => under
+                .begin()
+                .and_then(|()| under.checkpoint(SETTLING, || simulation.checkpoint())),
+        };
+        match passed {
+            Ok(()) => ControlFlow::Continue(()),
+            Err(why) => {
+                failure = Some(why);
+                ControlFlow::Break(())
+            }
+        }
+    };
+    let made = settle_incline_bed_from(state, bed, under.threads_of_one_run(), &mut pass);
+    match (bed_or_stopped(made)?, failure) {
+        (Some(bed), _) => {
+            bar.clear();
+            under.directory.journal.note(&settled(&bed));
+            Ok(bed)
+        }
+        (None, Some(why)) => Err(why),
+        (None, None) => Err(under.interrupted()),
+    }
+}
+
+fn bed_or_stopped(made: Result<Bed, SetupError>) -> Result<Option<Bed>, Failure> {
+    match made {
         Ok(bed) => Ok(Some(bed)),
         Err(SetupError::Interrupted) => Ok(None),
+        Err(SetupError::Record(why)) => Err(Failure::damaged(&why)),
         Err(SetupError::Diverged(error)) => Err(Failure::Run(error.to_string())),
         Err(error) => Err(Failure::Input(error.to_string())),
     }
 }
 
 /// How a bed has settled, in words.
-pub fn settled(bed: &Bed) -> String {
+fn settled(bed: &Bed) -> String {
     format!(
         "bed: {} grains over {} fixed, depth {:.4} m, solid fraction {:.4}, {:.2} contacts a grain",
         bed.report.grains,
@@ -184,24 +236,16 @@ pub fn failure(error: InclineError) -> Failure {
 
 pub(super) fn run(scene: &InclineScene, under: &mut Under) -> Result<Findings, Failure> {
     let threads = under.threads_of_one_run();
-    if under.resumed.is_none() {
-        under.begin()?;
-    }
-    let bar = Bar::new("settling the bed");
-    // The bed is not kept: the same seed gives the same bits again.
-    let Some(bed) = settle(&bed(scene), threads, &bar)? else {
-        return Err(under.interrupted());
-    };
-    bar.clear();
-    under.directory.journal.note(&settled(&bed));
+    let bed = settle_of_run(&bed(scene), under, &Bar::new("settling the bed"))?;
     let spec = spec(scene, &bed, threads);
     let mut run = match &under.resumed {
         Some(saved) => InclineRun::resume(spec.clone(), &saved.record),
         None => InclineRun::new(spec.clone()),
     }
     .map_err(failure)?;
+    under.begin()?;
     if under.resumed.is_some() {
-        under.begin()?;
+        // It has begun as it did.
     } else if let Some(rheology) = &scene.rheology {
         // As the other models of this scene begin.
         let free = bed.grains.iter().filter(|g| !g.fixed);

@@ -260,7 +260,7 @@ impl<'a> JoinedColumn<'a> {
 
     /// From a recipe's memory.
     fn recalled(&self, simulation: &Simulation, memory: &[f64]) -> Result<Live, Failure> {
-        let damaged = || Failure::Input("--resume: the checkpoint is damaged: recipe/state".into());
+        let damaged = || Failure::damaged("recipe/state");
         let (head, rest) = memory.split_at_checked(HEAD).ok_or_else(damaged)?;
         let (own, course) = rest
             .split_at_checked(head[1] as usize)

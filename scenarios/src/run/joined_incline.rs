@@ -145,25 +145,15 @@ fn failure(error: JoinedInclineError) -> Failure {
 pub(super) fn run(scene: &InclineScene, under: &mut Under) -> Result<Findings, Failure> {
     let keys = keys(scene)?;
     let threads = under.threads_of_one_run();
-    if under.resumed.is_none() {
-        under.begin()?;
-    }
     let bar = Bar::new("settling the bed");
-    // The bed is not kept: the same seed gives the same bits again.
-    let Some(bed) = incline::settle(&bed(scene, keys), threads, &bar)? else {
-        return Err(under.interrupted());
-    };
-    bar.clear();
-    under.directory.journal.note(&incline::settled(&bed));
+    let bed = incline::settle_of_run(&bed(scene, keys), under, &bar)?;
     let spec = spec(scene, keys, &bed, threads);
     let mut run = match &under.resumed {
         Some(saved) => JoinedInclineRun::resume(spec, &saved.record),
         None => JoinedInclineRun::new(spec),
     }
     .map_err(failure)?;
-    if under.resumed.is_some() {
-        under.begin()?;
-    }
+    under.begin()?;
     let bar = Bar::new(&format!(
         "{}, hybrid, at {} degrees",
         under.scene.name, scene.slope_degrees

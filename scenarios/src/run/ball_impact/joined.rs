@@ -143,7 +143,7 @@ impl<'a> JoinedBed<'a> {
     }
 
     fn recalled(&self, simulation: &Simulation, memory: &[f64]) -> Result<Bowl, Failure> {
-        let damaged = || Failure::Input("--resume: the checkpoint is damaged: recipe/state".into());
+        let damaged = || Failure::damaged("recipe/state");
         let (head, rest) = memory.split_first_chunk::<HEAD>().ok_or_else(damaged)?;
         let spec = self.spec(*head)?;
         let bowl = Bowl::read(spec, rest, simulation).map_err(|why| self.failure(why))?;

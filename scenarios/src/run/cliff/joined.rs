@@ -103,7 +103,7 @@ impl<'a> JoinedCliff<'a> {
         if rest.is_empty() {
             return Ok(());
         }
-        let damaged = || Failure::Input("--resume: the checkpoint is damaged: recipe/state".into());
+        let damaged = || Failure::damaged("recipe/state");
         let (broken, rest) = Broken::read(rest).ok_or_else(damaged)?;
         let (stands, rest) = rest.split_first().ok_or_else(damaged)?;
         let (standing, rest) = if *stands > 0.0 {
@@ -465,7 +465,7 @@ impl Recipe for JoinedCliff<'_> {
         self.recall(&mut guard, state)?;
         let (mut memory, _) = Self::parts(state);
         let columns = |d: f64| self.scene.heap_axis(d).columns;
-        let damaged = || Failure::Input("--resume: the checkpoint is damaged: recipe/state".into());
+        let damaged = || Failure::damaged("recipe/state");
         if let Some(mut live) = guard.take() {
             let every = self.steer_every(simulation.timestep()).max(1);
             let looks = simulation.steps_done().is_multiple_of(every);

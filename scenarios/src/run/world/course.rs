@@ -9,7 +9,6 @@ use super::pictures::Pictures;
 use super::recipe::{Course, Recipe};
 use super::store;
 use super::workshop::{Workshop, stand_ins};
-use crate::checkpoint::Checkpoint;
 use crate::cost::Cost;
 use crate::failure::Failure;
 use crate::frames::Frames;
@@ -100,7 +99,7 @@ fn packing(
     let own = under.directory.file(run_directory::PACKING);
     if own.exists() {
         // Killed before the run itself was saved.
-        kept_steps::take_midway(under);
+        kept_steps::forget_midway(under);
         let stored = packing_file::read(&own).map_err(|why| {
             Failure::Input(format!(
                 "--resume: {} cannot be used: {why}; nothing was changed",
@@ -111,15 +110,15 @@ fn packing(
     }
     if let Some(mut stored) = store::find(recipe, materials, &under.scene.origin)? {
         under.begin()?;
+        kept_steps::forget_midway(under);
         // The run that made it has paid for it.
         stored.grain_steps = 0;
         under.directory.journal.note("starts from a stored packing");
         packing_file::write(&own, &under.scene.name, &stored)?;
         return Ok((stored, false));
     }
-    under.begin()?;
-    let midway = kept_steps::take_midway(under);
-    let stored = make(recipe, materials, (under, midway))?;
+    let stored = make(recipe, materials, under)?;
+    kept_steps::forget_midway(under);
     packing_file::write(&own, &under.scene.name, &stored)?;
     if let Err(error) = kept_steps::remove(under.directory.path()) {
         let note = format!("finished steps of the preparation are still there: {error}");
@@ -132,12 +131,8 @@ fn packing(
     Ok((stored, false))
 }
 
-fn make(
-    recipe: &dyn Recipe,
-    materials: &Materials,
-    (under, midway): (&Under, Option<Checkpoint>),
-) -> Result<Stored, Failure> {
-    let keeper = Keeper::new(under, &materials.names, midway)?;
+fn make(recipe: &dyn Recipe, materials: &Materials, under: &Under) -> Result<Stored, Failure> {
+    let keeper = Keeper::new(under, &materials.names)?;
     let keys = (recipe.keys().seed, recipe.keys().step.preparation);
     let threads = under.threads_of_one_run();
     let mut shop = Workshop::new(materials, keys, threads, &keeper);
@@ -170,8 +165,7 @@ pub fn run(recipe: &dyn Recipe, under: &mut Under) -> Result<Findings, Failure> 
     let mut state = Vec::new();
     let mut simulation = match &under.resumed {
         Some(saved) => {
-            let damaged =
-                |why: String| Failure::Input(format!("--resume: the checkpoint is damaged: {why}"));
+            let damaged = |why: String| Failure::damaged(&why);
             history.restore(&saved.record).map_err(damaged)?;
             if let Some(averages) = &mut averages {
                 averages.restore(&saved.record).map_err(damaged)?;

@@ -25,9 +25,14 @@ const LOOPS: &str = "preparation/loops";
 /// Steps that took less are done again rather than kept.
 const LONG: Duration = Duration::from_secs(2);
 
-/// Takes the state of a preparation out of a run that goes on; what is left is that of the run itself.
-pub fn take_midway(under: &mut Under) -> Option<Checkpoint> {
-    under.resumed.take_if(|saved| saved.stage == STAGE)
+/// The state of a preparation in a run that goes on.
+pub fn midway<'a>(under: &'a Under) -> Option<&'a Checkpoint> {
+    under.resumed.as_ref().filter(|saved| saved.stage == STAGE)
+}
+
+/// Takes it out: what is left is the state of the run itself, or none.
+pub fn forget_midway(under: &mut Under) {
+    under.resumed.take_if(|saved| saved.stage == STAGE);
 }
 
 /// Whether steps are kept in a run directory.
@@ -66,30 +71,31 @@ pub struct Keeper<'a> {
 }
 
 impl<'a> Keeper<'a> {
-    /// A keeper of a run's preparation, which goes on from a checkpoint if it is given one.
+    /// A keeper of a run's preparation, which begins, or goes on from the run's checkpoint.
     ///
     /// # Errors
     /// If the checkpoint has no step.
-    pub fn new(
-        under: &'a Under<'a>,
-        materials: &'a [String],
-        saved: Option<Checkpoint>,
-    ) -> Result<Keeper<'a>, Failure> {
-        let midway = saved.map(|mut saved| {
-            let mut counts = saved.record.counts.remove(LOOPS).unwrap_or_default();
-            if counts.is_empty() {
-                let why = "--resume: the checkpoint is damaged: its preparation has no step";
-                return Err(Failure::Input(why.into()));
+    pub fn new(under: &'a Under<'a>, materials: &'a [String]) -> Result<Keeper<'a>, Failure> {
+        let midway = match midway(under) {
+            Some(saved) => {
+                let mut record = saved.record.clone();
+                let counts = record.counts.remove(LOOPS).unwrap_or_default();
+                let Some((&number, loops)) = counts.split_first() else {
+                    return Err(Failure::damaged("its preparation has no step"));
+                };
+                let loops = loops.to_vec();
+                Some((number, Midway { record, loops }))
             }
-            let loops = counts.split_off(1);
-            let record = saved.record;
-            Ok((counts[0], Midway { record, loops }))
-        });
+            None => {
+                under.begin()?;
+                None
+            }
+        };
         Ok(Keeper {
             under,
             materials,
             bar: Bar::new("preparation"),
-            midway: RefCell::new(midway.transpose()?),
+            midway: RefCell::new(midway),
             failure: RefCell::default(),
         })
     }
@@ -102,6 +108,9 @@ impl<'a> Keeper<'a> {
     /// Ends the watch; the error is what stopped the preparation.
     pub fn end(self) -> Result<(), Failure> {
         self.bar.clear();
+        if self.midway.into_inner().is_some() {
+            return Err(Failure::damaged("its preparation has no such step"));
+        }
         self.failure.into_inner().map_or(Ok(()), Err)
     }
 
@@ -124,18 +133,21 @@ impl<'a> Keeper<'a> {
         })?;
         self.journal()
             .note(&format!("preparation: step {step} was done before"));
+        // Killed before the next one was saved.
+        self.midway.borrow_mut().take_if(|(of, _)| *of <= step);
         Ok(Some(stored))
     }
 
-    /// Keeps what a step came to, which began at an instant, if it took long.
+    /// Keeps what a step came to, if it took long from an instant on or went on.
     pub fn keep(
         &self,
-        step: u64,
+        step: &Step,
         began: Instant,
         outcome: impl FnOnce() -> Stored,
     ) -> Result<(), Failure> {
+        self.under.begin()?;
         let long = self.under.given_pause.map_or(LONG, |pause| LONG.min(pause));
-        if began.elapsed() < long {
+        if step.from.is_none() && began.elapsed() < long {
             return Ok(());
         }
         let folder = self.under.directory.file(FOLDER);
@@ -147,7 +159,7 @@ impl<'a> Keeper<'a> {
             materials: self.materials.to_vec(),
             ..outcome()
         };
-        packing_file::write(&self.path(step), &self.under.scene.name, &stored)
+        packing_file::write(&self.path(step.number), &self.under.scene.name, &stored)
     }
 
     /// Watches a step.
@@ -180,13 +192,15 @@ pub struct Step<'a> {
 impl Step<'_> {
     /// Keeps the state if that is due, and stops the step if the user asked to.
     pub fn pass(&self, midway: impl FnOnce() -> Midway) -> ControlFlow<()> {
-        let passed = self.under.checkpoint(STAGE, || {
+        let save = || {
             let Midway { mut record, loops } = midway();
             let counts = [&[self.number], &loops[..]].concat();
             record.counts.insert(LOOPS.into(), counts);
             record
-        });
-        self.stopped_by(passed)
+        };
+        // A state that is gone on from has been accepted by now.
+        let begun = self.under.begin();
+        self.stopped_by(begun.and_then(|()| self.under.checkpoint(STAGE, save)))
     }
 
     /// Stops a step that begins again, if the user asked to.

@@ -100,16 +100,17 @@ impl<'a> Workshop<'a> {
         work: impl FnOnce(&mut Self, &mut Step) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
         let number = self.steps;
+        self.steps += 1;
         if let Some(stored) = self.keeper.outcome(number)? {
-            self.steps += 1;
             self.packing = stored.packing;
             self.notes.extend(stored.notes);
             self.grain_steps += stored.grain_steps;
             return Ok(());
         }
+        let mut step = self.keeper.step(number);
         let (began, noted, paid) = (Instant::now(), self.notes.len(), self.grain_steps);
-        self.step(work)?;
-        self.keeper.keep(number, began, || Stored {
+        work(self, &mut step)?;
+        self.keeper.keep(&step, began, || Stored {
             packing: self.packing.clone(),
             materials: self.materials.names.clone(),
             provenance: toml::Table::new(),
@@ -142,7 +143,7 @@ impl<'a> Workshop<'a> {
     fn simulation_of(&self, around: &Surroundings, step: &Step) -> Result<Simulation, Failure> {
         match step.goes_on() {
             Some(midway) => Simulation::resume(self.setup(around)?, &midway.record)
-                .map_err(|error| Failure::Run(format!("--resume: preparation: {error}"))),
+                .map_err(|error| Failure::damaged(&error.to_string())),
             None => self.simulation(around),
         }
     }
@@ -432,5 +433,8 @@ fn refused(error: SetupError) -> Failure {
 
 /// What ends a preparation that had begun; why one was interrupted its keeper knows.
 fn ended(error: SetupError) -> Failure {
-    Failure::Run(error.to_string())
+    match error {
+        SetupError::Record(why) => Failure::damaged(&why),
+        error => Failure::Run(error.to_string()),
+    }
 }
