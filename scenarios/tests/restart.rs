@@ -75,10 +75,16 @@ fn an_interrupted_run_goes_on_to_the_same_state() {
     let parts = folder.path().join("parts");
     succeed(folder.path(), &arguments("run", "whole", &[]));
     let log = || std::fs::read_to_string(parts.join("log.txt")).unwrap_or_default();
-    // The bed is logged when it has settled: the interruption then falls into the flow.
+    // The bed is logged when it has settled: before that an interruption falls into it, then into the flow.
     let status = interrupt(folder.path(), &arguments("run", "parts", &[]), || {
-        log().contains("bed:")
+        log().contains("run incline-moderate")
     });
+    assert_eq!(status, Some(130));
+    let remarks = summary(&parts)["remarks"].to_string();
+    assert!(remarks.contains("goes on from what was saved"), "{remarks}");
+    assert!(log().contains("checkpoint (bed)"), "{}", log());
+    let resume = arguments("run", "parts", &["--resume"]);
+    let status = interrupt(folder.path(), &resume, || log().contains("bed:"));
     assert_eq!(status, Some(130));
     assert_eq!(summary(&parts)["status"], "interrupted");
     let checkpoint = parts.join("checkpoint.h5");
@@ -118,20 +124,6 @@ fn an_interrupted_run_goes_on_to_the_same_state() {
     let profile = |d: &Path| std::fs::read_to_string(d.join("profile.csv")).unwrap();
     assert_eq!(profile(&parts), profile(&whole));
     assert!(!checkpoint.exists());
-}
-
-#[test]
-fn an_interruption_while_the_bed_settles_says_that_nothing_was_saved() {
-    let folder = tempfile::tempdir().unwrap();
-    let bed = folder.path().join("bed");
-    let log = || std::fs::read_to_string(bed.join("log.txt")).unwrap_or_default();
-    let many = ["--set", "grains.count=30000"];
-    let status = interrupt(folder.path(), &arguments("run", "bed", &many), || {
-        log().contains("run incline-moderate")
-    });
-    assert_eq!(status, Some(130));
-    let remarks = summary(&bed)["remarks"].to_string();
-    assert!(remarks.contains("starts again"), "{remarks}");
 }
 
 #[test]
