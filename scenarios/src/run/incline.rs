@@ -172,6 +172,9 @@ pub fn settle_of_run(bed: &InclineBed, under: &mut Under, bar: &Bar) -> Result<B
     }
     let state = under.resumed.take_if(|saved| settling(saved));
     let state = state.as_ref().map(|saved| &saved.record);
+    if state.is_some() {
+        under.directory.journal.note("the bed goes on settling");
+    }
     let mut failure = None;
     let mut pass = |share, simulation: &mut Simulation| {
         bar.set(share);

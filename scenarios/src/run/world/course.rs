@@ -141,8 +141,7 @@ fn make(recipe: &dyn Recipe, materials: &Materials, under: &Under) -> Result<Sto
         shop.compare_sizes();
     }
     let (packing, notes, grain_steps) = (shop.packing, shop.notes, shop.grain_steps);
-    keeper.end()?;
-    made?;
+    keeper.end(made)?;
     Ok(Stored {
         packing,
         materials: materials.names.clone(),

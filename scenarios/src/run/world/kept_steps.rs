@@ -105,13 +105,17 @@ impl<'a> Keeper<'a> {
         &self.under.directory.journal
     }
 
-    /// Ends the watch; the error is what stopped the preparation.
-    pub fn end(self) -> Result<(), Failure> {
+    /// Ends the watch of a preparation that was made or not; why one was stopped the keeper knows.
+    pub fn end(self, made: Result<(), Failure>) -> Result<(), Failure> {
         self.bar.clear();
-        if self.midway.into_inner().is_some() {
-            return Err(Failure::damaged("its preparation has no such step"));
+        if let Some(why) = self.failure.into_inner() {
+            return Err(why);
         }
-        self.failure.into_inner().map_or(Ok(()), Err)
+        made?;
+        match self.midway.into_inner() {
+            Some(_) => Err(Failure::damaged("its preparation has no such step")),
+            None => Ok(()),
+        }
     }
 
     fn path(&self, step: u64) -> PathBuf {
@@ -145,6 +149,10 @@ impl<'a> Keeper<'a> {
         began: Instant,
         outcome: impl FnOnce() -> Stored,
     ) -> Result<(), Failure> {
+        // The state of a later step is still to be accepted.
+        if self.midway.borrow().is_some() {
+            return Ok(());
+        }
         self.under.begin()?;
         let long = self.under.given_pause.map_or(LONG, |pause| LONG.min(pause));
         if step.from.is_none() && began.elapsed() < long {
@@ -170,9 +178,7 @@ impl<'a> Keeper<'a> {
             self.journal().note(&note);
         }
         Step {
-            under: self.under,
-            bar: &self.bar,
-            failure: &self.failure,
+            keeper: self,
             number,
             from: midway.map(|(_, midway)| midway),
         }
@@ -182,9 +188,7 @@ impl<'a> Keeper<'a> {
 /// A step of a preparation under way.
 #[derive(Debug)]
 pub struct Step<'a> {
-    under: &'a Under<'a>,
-    bar: &'a Bar,
-    failure: &'a RefCell<Option<Failure>>,
+    keeper: &'a Keeper<'a>,
     number: u64,
     from: Option<Midway>,
 }
@@ -192,6 +196,10 @@ pub struct Step<'a> {
 impl Step<'_> {
     /// Keeps the state if that is due, and stops the step if the user asked to.
     pub fn pass(&self, midway: impl FnOnce() -> Midway) -> ControlFlow<()> {
+        // A step that is done again must not take the place of a later one's state.
+        if self.keeper.midway.borrow().is_some() {
+            return self.pass_without_state();
+        }
         let save = || {
             let Midway { mut record, loops } = midway();
             let counts = [&[self.number], &loops[..]].concat();
@@ -199,14 +207,14 @@ impl Step<'_> {
             record
         };
         // A state that is gone on from has been accepted by now.
-        let begun = self.under.begin();
-        self.stopped_by(begun.and_then(|()| self.under.checkpoint(STAGE, save)))
+        let under = self.keeper.under;
+        self.stopped_by(under.begin().and_then(|()| under.checkpoint(STAGE, save)))
     }
 
-    /// Stops a step that begins again, if the user asked to.
+    /// Stops a step without keeping its state, if the user asked to.
     fn pass_without_state(&self) -> ControlFlow<()> {
         self.stopped_by(match crate::interruption::requested() {
-            true => Err(self.under.interrupted()),
+            true => Err(self.keeper.under.interrupted()),
             false => Ok(()),
         })
     }
@@ -215,14 +223,14 @@ impl Step<'_> {
         let Err(why) = passed else {
             return ControlFlow::Continue(());
         };
-        *self.failure.borrow_mut() = Some(why);
+        *self.keeper.failure.borrow_mut() = Some(why);
         ControlFlow::Break(())
     }
 }
 
 impl Watch for Step<'_> {
     fn look(&mut self, look: &mut Look) -> ControlFlow<()> {
-        self.bar.say(&look.measures.to_string());
+        self.keeper.bar.say(&look.measures.to_string());
         match look.can_go_on() {
             true => self.pass(|| look.midway().unwrap_or_default()),
             false => self.pass_without_state(),
