@@ -390,7 +390,9 @@ fn refuse_unfinished(path: &Path) -> Result<(), Failure> {
         return Ok(());
     };
     let summary = serde_json::from_str::<serde_json::Value>(&text).unwrap_or_default();
-    let saved = SAVED.iter().find(|name| path.join(name).exists());
+    let mut saved = SAVED.into_iter().filter(|name| path.join(name).exists());
+    let steps = kept_steps::exist(path).then_some(kept_steps::FOLDER);
+    let saved = saved.next().or(steps);
     match saved {
         Some(saved) if summary["status"] != "done" => Err(Failure::Input(format!(
             "--out {}: holds a run of `{}` that is not finished and can be gone on with ({saved}); allowed: --resume to go on with it (if this version wrote it), --overwrite of `run` and `calibrate` to give it up, or another directory",

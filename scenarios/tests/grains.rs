@@ -286,6 +286,14 @@ fn what_is_wrong_with_a_section_is_said_with_its_key() {
             &["prepare[0].count", "relax"],
         ),
         (
+            "prepare=[{do=\"insert\",count=100000,within=[{shape=\"ball\",point=[0,0,0],radius=0.1}]}]",
+            &["prepare[0].count", "100000", "within", "0.38"],
+        ),
+        (
+            "prepare=[{do=\"insert\",count=3,within=[{shape=\"block\",lower=[0,0,0]}]}]",
+            &["prepare[0]", "axis 0", "bounded"],
+        ),
+        (
             "prepare=[{do=\"stir\"}]",
             &["prepare[0].do", "stir", "pour"],
         ),

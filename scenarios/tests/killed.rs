@@ -4,6 +4,7 @@ use crate::command::{
     CORE, FRONT_ON_A_SLOPE, INSTALMENTS, INTERVAL, MOVING_EDGE, SMALL_COMET_CLIFF, SMALL_HYBRID,
     SMALL_JOINED_COLUMN, colluvium, hash, pause, succeed, summary, table,
 };
+use crate::own_scenes::preparations::{BASE, EQUAL, TUBE};
 use crate::packings::{COMET_CLIFF, JOINED_COLUMN, Kept, WIDE_COLUMN};
 use rand::{RngExt, SeedableRng};
 use rand_chacha::ChaCha8Rng;
@@ -75,7 +76,7 @@ fn killed_and_whole(
         packing.put(folder.path());
     }
     if scene == OWN_FILE {
-        std::fs::write(folder.path().join(OWN_FILE), PREPARED).unwrap();
+        std::fs::write(folder.path().join(OWN_FILE), prepared()).unwrap();
     }
     let arguments = |out: &'static str, more: &[&'static str]| {
         let mut list = vec!["run", scene, "--out", out];
@@ -161,52 +162,23 @@ fn killed_and_whole(
 const OWN_FILE: &str = "own.toml";
 
 /// A scene of preparation: grains inserted, at rest, more poured on them, gravity that falls in stages.
-const PREPARED: &str = r#"
-scene = "grains"
-seed = 5
-duration = 1.0e-3
-output = { rows = 2, pictures = 0 }
-
-[contact]
-normal = "hertz"
-youngs_modulus = 1.0e6
-poissons_ratio = 0.3
-restitution = 0.4
-friction = 0.4
-
-[grains.ball]
-density = 1000.0
-sizes = { law = "uniform", smallest = 4.0e-3, largest = 5.0e-3 }
-
-[gravity]
-uniform = [0.0, 0.0, -9.81]
-
-[walls.floor]
-shape = "plane"
-axis = [0.0, 0.0, 1.0]
-
-[walls.tube]
-shape = "cylinder"
-axis = [0.0, 0.0, 1.0]
-radius = 0.03
-
-[[prepare]]
-do = "insert"
-count = 150
-within = [{ shape = "cylinder", axis = [0.0, 0.0, 1.0], point = [0.0, 0.0, 0.0], radius = 0.029 }, { shape = "block", lower = [-1.0, -1.0, 0.0], upper = [1.0, 1.0, 0.1] }]
-
-[[prepare]]
-do = "relax"
-
-[[prepare]]
-do = "pour"
-count = 100
-within = [{ shape = "cylinder", axis = [0.0, 0.0, 1.0], point = [0.0, 0.0, 0.0], radius = 0.029 }, { shape = "block", lower = [-1.0, -1.0, 0.08], upper = [1.0, 1.0, 0.15] }]
-
-[[prepare]]
-do = "stages"
-gravities = [9.81, 1.0e-1]
-"#;
+fn prepared() -> String {
+    let within = |low: f64, high: f64| {
+        format!(
+            "within = [{{ shape = \"cylinder\", axis = [0.0, 0.0, 1.0], point = [0.0, 0.0, 0.0], radius = 0.029 }}, \
+             {{ shape = \"block\", lower = [-1.0, -1.0, {low:?}], upper = [1.0, 1.0, {high:?}] }}]\n"
+        )
+    };
+    let sizes = "[grains.ball]\ndensity = 1000.0\n\
+                 sizes = { law = \"uniform\", smallest = 4.0e-3, largest = 5.0e-3 }\n";
+    let (below, above) = (within(0.0, 0.1), within(0.08, 0.15));
+    let steps = format!(
+        "\n[[prepare]]\ndo = \"insert\"\ncount = 150\n{below}\n[[prepare]]\ndo = \"relax\"\n\
+         \n[[prepare]]\ndo = \"pour\"\ncount = 100\n{above}\
+         \n[[prepare]]\ndo = \"stages\"\ngravities = [9.81, 1.0e-1]\n"
+    );
+    [BASE, sizes, TUBE, &steps].concat()
+}
 
 #[test]
 fn a_killed_preparation_goes_on() {
@@ -217,54 +189,105 @@ fn a_killed_preparation_goes_on() {
     let (again, begun) = (times("goes on"), times("was done before"));
     assert!(again > 0 && begun > 0, "{}", log("parts"));
     assert_eq!(log("whole").matches("goes on").count(), 0);
-    let prepared = |name: &str| summary(&folder.path().join(name))["preparation"].clone();
-    assert_eq!(prepared("parts"), prepared("whole"));
+    let notes = |name: &str| summary(&folder.path().join(name))["preparation"].clone();
+    assert_eq!(notes("parts"), notes("whole"));
     let steps = |name: &str| summary(&folder.path().join(name))["cost"]["grain_steps"].clone();
     assert_eq!(steps("parts"), steps("whole"));
 }
 
-/// Ctrl-C in a step, at its first looks and late, and what the messages say; a state of another preparation, and one that is cut,
-/// are refused and kept.
+/// Ctrl-C in a step and what the messages say; a state that is cut, a step's file that is, and one of another step are refused, and
+/// nothing is changed.
 #[test]
 fn a_preparation_that_is_stopped_says_how_to_go_on() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    std::fs::write(at.join(OWN_FILE), PREPARED).unwrap();
+    std::fs::write(at.join(OWN_FILE), prepared()).unwrap();
     let run = ["run", OWN_FILE, "--out", "parts", "--threads", "1"];
+    let resume = [&run[..], &["--resume"]].concat();
+    let parts = at.join("parts");
+    let log = || std::fs::read_to_string(parts.join("log.txt")).unwrap_or_default();
+    // The first step that takes its time is under way.
+    let message = stopped_when(at, &run, || log().contains("insert:"));
+    assert!(message.contains("goes on from what was saved"), "{message}");
+    assert_eq!(summary(&parts)["status"], "interrupted");
+    let refused = |list: &[&str], words: &[&str]| {
+        let refused = colluvium(at, list);
+        assert_eq!(refused.status.code(), Some(2), "{refused:?}");
+        let message = String::from_utf8_lossy(&refused.stderr).into_owned();
+        for word in words {
+            assert!(message.contains(word), "no `{word}` in: {message}");
+        }
+        assert_eq!(summary(&parts)["status"], "interrupted");
+    };
+    refused(&run, &["not finished", "checkpoint.h5"]);
+    let cut_and_back = |file: &Path, words: &[&str]| {
+        let saved = std::fs::read(file).unwrap();
+        std::fs::write(file, &saved[..saved.len() / 2]).unwrap();
+        refused(&resume, words);
+        // A new file, without the lock that a child may have inherited.
+        std::fs::remove_file(file).unwrap();
+        std::fs::write(file, &saved).unwrap();
+    };
+    cut_and_back(&parts.join("checkpoint.h5"), &["checkpoint.h5", "damaged"]);
+    // A step that went on is kept; the next one is under way.
+    stopped_when(at, &resume, || log().contains("relax:"));
+    let [first, second] =
+        ["step_0.h5", "step_1.h5"].map(|name| parts.join("preparation").join(name));
+    cut_and_back(&first, &["step_0.h5", "damaged"]);
+    if !second.exists() {
+        std::fs::copy(&first, &second).unwrap();
+        refused(&resume, &["step_1.h5", "another preparation", "step"]);
+        std::fs::remove_file(&second).unwrap();
+    }
+    // Steps are enough to be kept from a new run.
+    for name in ["checkpoint.h5", "checkpoint_before.h5"] {
+        std::fs::rename(parts.join(name), at.join(name)).unwrap_or_default();
+    }
+    refused(&run, &["not finished", "preparation"]);
+    std::fs::rename(at.join("checkpoint.h5"), parts.join("checkpoint.h5")).unwrap();
+
+    succeed(at, &resume);
+    assert!(
+        log().contains("step 0 goes on") && log().contains("step 0 was done before"),
+        "{}",
+        log()
+    );
+    succeed(at, &["run", OWN_FILE, "--out", "whole"]);
+    assert_eq!(hash(&parts), hash(&at.join("whole")));
+    assert!(!parts.join("preparation").exists() && !parts.join("checkpoint.h5").exists());
+}
+
+/// What cannot be gone on with says so.
+#[test]
+fn a_jam_that_is_stopped_starts_again() {
+    let folder = tempfile::tempdir().unwrap();
+    let dry = BASE.replace("cohesion = \"dmt\"\nwork_of_adhesion = 0.1\n", "");
+    let scene = format!("{dry}{EQUAL}\n[[prepare]]\ndo = \"jam\"\ncount = 20000\n");
+    std::fs::write(folder.path().join(OWN_FILE), scene).unwrap();
+    let log = folder.path().join("jam/log.txt");
+    let begun = || std::fs::read_to_string(&log).is_ok_and(|log| log.contains("threads"));
+    let message = stopped_when(folder.path(), &["run", OWN_FILE, "--out", "jam"], begun);
+    assert!(message.contains("starts again"), "{message}");
+}
+
+/// Stops a run with Ctrl-C once something holds; gives what it says.
+fn stopped_when(folder: &Path, arguments: &[&str], now: impl Fn() -> bool) -> String {
     let child = Command::new(env!("CARGO_BIN_EXE_colluvium"))
-        .args(run)
-        .current_dir(at)
+        .args(arguments)
+        .current_dir(folder)
         .stdout(Stdio::null())
         .stderr(Stdio::piped())
         .spawn()
         .unwrap();
-    let parts = at.join("parts");
-    let log = || std::fs::read_to_string(parts.join("log.txt")).unwrap_or_default();
     let begin = Instant::now();
-    // The first step that takes its time is under way.
-    while !log().contains("insert:") && begin.elapsed() < PATIENCE {
+    while !now() && begin.elapsed() < PATIENCE {
         pause();
     }
     let id = child.id().to_string();
     Command::new("kill").args(["-INT", &id]).status().unwrap();
     let ended = child.wait_with_output().unwrap();
-    assert_eq!(ended.status.code(), Some(130));
-    let message = String::from_utf8_lossy(&ended.stderr).into_owned();
-    assert!(message.contains("goes on from what was saved"), "{message}");
-    assert_eq!(summary(&parts)["status"], "interrupted");
-
-    let saved = std::fs::read(parts.join("checkpoint.h5")).unwrap();
-    let resume = [&run[..], &["--resume"]].concat();
-    std::fs::write(parts.join("checkpoint.h5"), &saved[..saved.len() / 2]).unwrap();
-    let refused = colluvium(at, &resume);
-    assert_eq!(refused.status.code(), Some(2), "{refused:?}");
-    assert_eq!(summary(&parts)["status"], "interrupted");
-    std::fs::write(parts.join("checkpoint.h5"), &saved).unwrap();
-    succeed(at, &resume);
-    assert!(log().contains("preparation: step 0 goes on"), "{}", log());
-    succeed(at, &["run", OWN_FILE, "--out", "whole"]);
-    assert_eq!(hash(&parts), hash(&at.join("whole")));
-    assert!(!parts.join("preparation").exists() && !parts.join("checkpoint.h5").exists());
+    assert_eq!(ended.status.code(), Some(130), "{ended:?}");
+    String::from_utf8_lossy(&ended.stderr).into_owned()
 }
 
 #[test]

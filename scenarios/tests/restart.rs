@@ -90,7 +90,8 @@ fn an_interrupted_run_goes_on_to_the_same_state() {
     let checkpoint = parts.join("checkpoint.h5");
     let saved = std::fs::read(&checkpoint).unwrap();
 
-    // A truncated checkpoint is refused, and nothing is touched.
+    // A truncated checkpoint without one before it, that of the bed, is refused, and nothing is touched.
+    std::fs::remove_file(parts.join("checkpoint_before.h5")).unwrap();
     std::fs::write(&checkpoint, &saved[..saved.len() / 3]).unwrap();
     let refused = colluvium(folder.path(), &arguments("run", "parts", &["--resume"]));
     assert_eq!(refused.status.code(), Some(2));

@@ -12,7 +12,7 @@ use super::coordination::{Coordination, HELD_BY_FRICTION};
 use super::relaxation::{Relaxation, time_unit};
 use super::rest::RestMeasures;
 use super::solid_fraction::solid_fraction;
-use super::watch::{Trail, Watch};
+use super::watch::{Trail, Watch, out_of_place};
 use crate::loads::Load;
 use crate::region::Region;
 use crate::setup::{SetupError, check};
@@ -95,7 +95,16 @@ pub fn compact(
     let (first, mut target, mut acceleration, mut pulled) = match trail.next()? {
         Some([pull, target, acceleration, pulled]) => {
             let [target, acceleration] = [target, acceleration].map(f64::from_bits);
-            (pull as u32, target, acceleration, pulled != 0)
+            let pull = u32::try_from(pull)
+                .ok()
+                .filter(|pull| (1..=PULLS).contains(pull));
+            let pull = pull.filter(|_| target > 0.0 && acceleration > 0.0);
+            (
+                pull.ok_or_else(out_of_place)?,
+                target,
+                acceleration,
+                pulled != 0,
+            )
         }
         None if reached > spec.solid_fraction * (1.0 + spec.tolerance) => {
             return Err(spec.missed(reached, "the cloud is denser before it is pulled"));
@@ -199,18 +208,24 @@ impl CentralCompaction {
         trail: &mut Trail,
         watch: &mut dyn Watch,
     ) -> Result<(), SetupError> {
-        let (mut gathered, mut done) = match trail.next()? {
-            Some([gathered, look, pull]) => {
+        // Sums of radii go by the order of the grains, which changes on the way.
+        let (mut gathered, mut done, mut unit) = match trail.last()? {
+            Some([gathered, look, pull, unit]) => {
                 *acceleration = f64::from_bits(pull);
-                (gathered != 0, look)
+                (gathered != 0, look, f64::from_bits(unit))
             }
-            None => (hangs_together(simulation), 0),
+            None => {
+                let unit = time_unit(simulation, *acceleration);
+                (hangs_together(simulation), 0, unit)
+            }
         };
         loop {
-            let unit = time_unit(simulation, *acceleration);
             let steps = (unit / LOOKS / simulation.timestep()).ceil().max(1.0);
             let keep = (-self.relaxation.damping * steps * simulation.timestep() / unit).exp();
             let looks = (self.relaxation.patience * LOOKS) as u64;
+            if !(unit > 0.0 && *acceleration > 0.0 && done <= looks) {
+                return Err(out_of_place());
+            }
             for look in done + 1..=looks.max(1) {
                 self.load(simulation, *acceleration)?;
                 simulation.advance(steps as u64)?;
@@ -222,7 +237,8 @@ impl CentralCompaction {
                 if self.relaxation.rest.holds(&rest) {
                     break;
                 }
-                let counts = [gathered.into(), look, acceleration.to_bits()];
+                let counts = [acceleration.to_bits(), unit.to_bits()];
+                let counts = [gathered.into(), look, counts[0], counts[1]];
                 trail.show(watch, simulation, (&rest, &counts))?;
             }
             (gathered, done) = (true, 0);
@@ -234,6 +250,7 @@ impl CentralCompaction {
                 return Err(self.missed(reached, "the largest acceleration packs no denser"));
             }
             *acceleration = (HARDER * *acceleration).min(self.accelerations[1]);
+            unit = time_unit(simulation, *acceleration);
         }
     }
 
@@ -261,19 +278,22 @@ impl CentralCompaction {
         trail: &mut Trail,
         watch: &mut dyn Watch,
     ) -> Result<RestMeasures, SetupError> {
-        let (mut quiet, done) = match trail.next()? {
-            Some([quiet, look]) => (quiet, look),
+        let (acceleration, relaxation) = (self.accelerations[0], &self.relaxation);
+        let looks = (relaxation.patience * LOOKS) as u64;
+        let (mut quiet, done, unit) = match trail.last()? {
+            Some([quiet, look, unit]) => (quiet, look, f64::from_bits(unit)),
             None => {
                 simulation.set_loads(&[])?;
                 simulation.damp(0.0);
-                (0, 0)
+                (0, 0, time_unit(simulation, acceleration))
             }
         };
-        let (acceleration, relaxation) = (self.accelerations[0], &self.relaxation);
-        let unit = time_unit(simulation, acceleration);
+        if !(unit > 0.0 && quiet < 3 && done <= looks) {
+            return Err(out_of_place());
+        }
         let steps = (unit / LOOKS / simulation.timestep()).ceil().max(1.0);
         let keep = (-relaxation.damping * steps * simulation.timestep() / unit).exp();
-        for look in done + 1..=(relaxation.patience * LOOKS) as u64 {
+        for look in done + 1..=looks {
             simulation.advance(steps as u64)?;
             simulation.damp(keep);
             let rest = simulation.rest_measures(acceleration);
@@ -285,7 +305,7 @@ impl CentralCompaction {
             if quiet >= 3 {
                 return Ok(rest);
             }
-            trail.show(watch, simulation, (&rest, &[quiet, look]))?;
+            trail.show(watch, simulation, (&rest, &[quiet, look, unit.to_bits()]))?;
         }
         Err(SetupError::Restless {
             measures: Box::new(simulation.rest_measures(acceleration)),

@@ -155,6 +155,18 @@ pub fn insert_loose(
 }
 
 impl Insertion {
+    /// Volume of the grains that are asked for over that of the region. Random places end near 0.38 for equal grains.
+    ///
+    /// # Errors
+    /// If a number is out of its range.
+    pub fn solid_fraction_asked(&self) -> Result<f64, SetupError> {
+        self.validate()?;
+        let volume = self.volume()?;
+        let mut random = ChaCha8Rng::seed_from_u64(self.seed);
+        let grains = draw(&self.ingredients, self.amount, volume, &mut random)?;
+        Ok(grains.iter().map(Grain::volume).sum::<f64>() / volume)
+    }
+
     pub(super) fn validate(&self) -> Result<(), SetupError> {
         self.region.validate("insertion.region")?;
         check("insertion.gap", self.gap, "≥ 0 m", |v| v >= 0.0)?;

@@ -46,4 +46,4 @@ pub use size_report::{Compared, SizeReport};
 pub use sizes::{RadiusLaw, SizeLaw, Weight};
 pub use solid_fraction::solid_fraction;
 pub use stages::{StageReport, Stages, settle_in_stages};
-pub use watch::{Look, Midway, Watch};
+pub use watch::{Look, LookState, Midway, Watch};

@@ -8,7 +8,7 @@ use super::insertion::{Insertion, Places};
 use super::relaxation::{Relaxation, relax_along};
 use super::rest::RestMeasures;
 use super::size_report::SizeReport;
-use super::watch::{Trail, Watch};
+use super::watch::{Trail, Watch, out_of_place};
 use crate::grains::Grain;
 use crate::region::Region;
 use crate::setup::{SetupError, check};
@@ -172,10 +172,10 @@ fn gone_on(
 ) -> Result<(usize, u32, u32), SetupError> {
     random.set_word_pos(u128::from(high) << 64 | u128::from(low));
     match (next as usize, batches.try_into(), blocked.try_into()) {
-        (next, Ok(batches), Ok(blocked)) if next <= grains.len() => Ok((next, batches, blocked)),
-        _ => Err(SetupError::Record(
-            "a pouring of more grains than there are".into(),
-        )),
+        (next, Ok(batches), Ok(blocked)) if next <= grains.len() && blocked <= PATIENCE => {
+            Ok((next, batches, blocked))
+        }
+        _ => Err(out_of_place()),
     }
 }
 

@@ -7,7 +7,7 @@
 //! the whole packing, and changes no state of rest.
 
 use super::rest::{Rest, RestMeasures};
-use super::watch::{Trail, Watch};
+use super::watch::{Trail, Watch, out_of_place};
 use crate::setup::{SetupError, check};
 use crate::simulation::Simulation;
 use serde::{Deserialize, Serialize};
@@ -81,11 +81,17 @@ pub(super) fn relax_along(
     watch: &mut dyn Watch,
 ) -> Result<RestMeasures, SetupError> {
     spec.validate()?;
-    let done = trail.next()?.map_or(0, |[look]| look);
-    let unit = time_unit(simulation, spec.acceleration);
+    // Sums of radii go by the order of the grains, which changes on the way.
+    let (done, unit) = match trail.last()? {
+        Some([look, unit]) => (look, f64::from_bits(unit)),
+        None => (0, time_unit(simulation, spec.acceleration)),
+    };
     let steps = (unit / LOOKS / simulation.timestep()).ceil().max(1.0);
     let keep = (-spec.damping * steps * simulation.timestep() / unit).exp();
     let looks = (spec.patience * unit / (steps * simulation.timestep())).ceil() as u64;
+    if !(unit > 0.0 && done <= looks.max(MEASURE_EVERY)) {
+        return Err(out_of_place());
+    }
     let mut measures = simulation.rest_measures(spec.acceleration);
     for look in done + 1..=looks.max(MEASURE_EVERY) {
         simulation.advance(steps as u64)?;
@@ -99,7 +105,7 @@ pub(super) fn relax_along(
         if spec.rest.holds(&measures) {
             return Ok(measures);
         }
-        trail.show(watch, simulation, (&measures, &[look]))?;
+        trail.show(watch, simulation, (&measures, &[look, unit.to_bits()]))?;
     }
     Err(SetupError::Restless {
         measures: Box::new(measures),

@@ -9,7 +9,7 @@
 use super::relaxation::{Relaxation, relax_along};
 use super::rest::{Rest, RestMeasures};
 use super::stiffness::{self, MeanGrain};
-use super::watch::{Trail, Watch};
+use super::watch::{Trail, Watch, out_of_place};
 use crate::clumps::Clump;
 use crate::contact::{LawTable, Laws};
 use crate::grains::Grain;
@@ -199,6 +199,10 @@ impl Begun {
         let cut = || SetupError::Record("the stages of the preparation are cut short".into());
         let [done, own @ ..] = trail.next::<4>()?.ok_or_else(cut)?;
         let [factor, step, before] = own.map(f64::from_bits);
+        let positive = |x: f64| x > 0.0 && x.is_finite();
+        if !(positive(factor) && positive(step) && before.is_finite()) {
+            return Err(out_of_place());
+        }
         let mut reports = Vec::new();
         for _ in 0..done {
             reports.push(StageReport::of_counts(trail.next()?.ok_or_else(cut)?));

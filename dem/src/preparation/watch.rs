@@ -22,24 +22,28 @@ pub struct Midway {
 pub struct Look<'a> {
     /// How close to rest it is.
     pub measures: &'a RestMeasures,
-    state: Option<(&'a mut Simulation, &'a Trail, &'a [u64])>,
+    /// Its state; none where a preparation begins again if it is stopped.
+    pub state: Option<LookState<'a>>,
+}
+
+/// The state of a preparation at a look.
+pub struct LookState<'a> {
+    simulation: &'a mut Simulation,
+    trail: &'a Trail,
+    own: &'a [u64],
+}
+
+impl LookState<'_> {
+    /// What goes on from here.
+    pub fn midway(&mut self) -> Midway {
+        Midway {
+            record: self.simulation.checkpoint(),
+            loops: [&self.trail.around, self.own].concat(),
+        }
+    }
 }
 
 impl<'a> Look<'a> {
-    /// What goes on from here; none where a preparation begins again if it is stopped.
-    pub fn midway(&mut self) -> Option<Midway> {
-        let (simulation, trail, own) = self.state.as_mut()?;
-        Some(Midway {
-            record: simulation.checkpoint(),
-            loops: [&trail.around, *own].concat(),
-        })
-    }
-
-    /// Whether [`Look::midway`] has something.
-    pub fn can_go_on(&self) -> bool {
-        self.state.is_some()
-    }
-
     /// A look at a preparation that cannot be gone on with.
     pub(super) fn passing(measures: &'a RestMeasures) -> Look<'a> {
         Look {
@@ -103,6 +107,18 @@ impl Trail {
         Ok(Some(counts))
     }
 
+    /// The same of the innermost loop.
+    ///
+    /// # Errors
+    /// If there are more, too.
+    pub fn last<const N: usize>(&mut self) -> Result<Option<[u64; N]>, SetupError> {
+        let counts = self.next()?;
+        if self.ahead.is_empty() {
+            return Ok(counts);
+        }
+        Err(out_of_place())
+    }
+
     /// Enters what a loop of these counts does.
     pub fn enter(&mut self, counts: &[u64]) {
         self.around.extend(counts);
@@ -126,10 +142,19 @@ impl Trail {
     ) -> Result<(), SetupError> {
         let mut look = Look {
             measures,
-            state: Some((simulation, self, own)),
+            state: Some(LookState {
+                simulation,
+                trail: self,
+                own,
+            }),
         };
         stopped(watch.look(&mut look))
     }
+}
+
+/// The error of counts that no preparation comes to.
+pub(super) fn out_of_place() -> SetupError {
+    SetupError::Record("the loops of the preparation are those of another one".into())
 }
 
 /// The error of a preparation that was stopped.

@@ -251,7 +251,7 @@ impl Recipe for AngleOfReposeScene {
             timestep: step,
             seed: self.seed,
         };
-        shop.kept_step(|shop, step| {
+        shop.step(|shop, step| {
             let state = step.goes_on().map(|midway| &midway.record);
             let look = &mut |_, simulation: &mut Simulation| {
                 step.pass(|| Midway {

@@ -3,7 +3,7 @@
 use super::world::boulders::{boulders, size_index};
 use super::world::fragments;
 use super::world::steps::{self, Around};
-use super::world::workshop::Surroundings;
+use super::world::workshop::{Surroundings, open_space};
 use super::world::{Expected, Ran, Recipe, RecipeKeys, Workshop, World};
 use crate::failure::Failure;
 use crate::run_directory::toml_table;
@@ -83,6 +83,14 @@ impl Recipe for GrainsScene {
             layers::remove(&mut keys, &format!("walls.{wall}.motion"));
         }
         Ok(Some(keys))
+    }
+
+    fn check_room(&self, materials: &Materials, origin: &str) -> Result<(), Failure> {
+        let domain = match &self.boundaries {
+            Some(boundaries) => boundaries.domain(origin)?,
+            None => open_space(),
+        };
+        steps::check_room(&self.prepare, materials, (domain, self.seed), origin)
     }
 
     fn prepare(&self, shop: &mut Workshop, origin: &str) -> Result<(), Failure> {

@@ -2,7 +2,7 @@
 
 mod boundaries;
 mod gravity;
-mod preparations;
+pub mod preparations;
 mod walls;
 
 use crate::command::{Columns, succeed};

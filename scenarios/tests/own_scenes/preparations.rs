@@ -6,7 +6,7 @@ use serde_json::Value;
 use std::path::Path;
 
 /// A law, kinds of grains to come.
-const BASE: &str = r#"
+pub const BASE: &str = r#"
 scene = "grains"
 seed = 5
 duration = 0.001
@@ -23,7 +23,22 @@ work_of_adhesion = 0.1
 
 "#;
 
-const EQUAL: &str =
+/// A tube with a floor under gravity.
+pub const TUBE: &str = r#"
+[gravity]
+uniform = [0.0, 0.0, -9.81]
+
+[walls.floor]
+shape = "plane"
+axis = [0.0, 0.0, 1.0]
+
+[walls.tube]
+shape = "cylinder"
+axis = [0.0, 0.0, 1.0]
+radius = 0.03
+"#;
+
+pub const EQUAL: &str =
     "[grains.ball]\ndensity = 1000.0\nsizes = { law = \"equal\", radius = 0.005 }\n";
 
 fn run(folder: &Path, out: &str, sections: &[&str]) -> Value {
@@ -66,19 +81,6 @@ fn check_report(found: &Value, of: &str) {
 fn every_step_says_what_it_has_come_to() {
     let folder = tempfile::tempdir().unwrap();
     let at = folder.path();
-    let bed = r#"
-[gravity]
-uniform = [0.0, 0.0, -9.81]
-
-[walls.floor]
-shape = "plane"
-axis = [0.0, 0.0, 1.0]
-
-[walls.tube]
-shape = "cylinder"
-axis = [0.0, 0.0, 1.0]
-radius = 0.03
-"#;
     let above = "within = [{ shape = \"cylinder\", axis = [0.0, 0.0, 1.0], point = [0.0, 0.0, 0.0], radius = 0.029 }, \
                  { shape = \"block\", lower = [-1.0, -1.0, 0.05], upper = [1.0, 1.0, 0.12] }]\n";
     let poured = format!("\n[[prepare]]\ndo = \"pour\"\ncount = 80\n{above}");
@@ -93,7 +95,7 @@ radius = 0.03
         ("staged", staged, &["pour", "stage"]),
         ("glued", format!("{poured}{low}"), &["glue"]),
     ] {
-        let found = run(at, name, &[BASE, EQUAL, bed, &steps]);
+        let found = run(at, name, &[BASE, EQUAL, TUBE, &steps]);
         check_report(&found, name);
         for word in words {
             assert!(!notes(&found, word).is_empty(), "{name}: {word}");

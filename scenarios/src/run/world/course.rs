@@ -58,6 +58,9 @@ pub fn check(scene: &Scene, recipe: &dyn Recipe) -> Result<(), Failure> {
     let origin = &scene.origin;
     let materials = recipe.materials(origin)?;
     let found = store::find(recipe, &materials, origin)?;
+    if found.is_none() {
+        recipe.check_room(&materials, origin)?;
+    }
     let packing = found.map_or_else(|| trial(&materials), |stored| stored.packing);
     let stand = Stand::new(recipe, &packing, &materials, Threads::Serial, origin)?;
     // Lengths and cells depend on the grains, which are not there yet; keys do not.
@@ -108,9 +111,14 @@ fn packing(
         })?;
         return Ok((stored, true));
     }
-    if let Some(mut stored) = store::find(recipe, materials, &under.scene.origin)? {
+    // What another run has kept meanwhile is the same; this one goes on with its own.
+    let own_part = kept_steps::midway(under).is_some() || kept_steps::exist(under.directory.path());
+    let found = match own_part {
+        true => None,
+        false => store::find(recipe, materials, &under.scene.origin)?,
+    };
+    if let Some(mut stored) = found {
         under.begin()?;
-        kept_steps::forget_midway(under);
         // The run that made it has paid for it.
         stored.grain_steps = 0;
         under.directory.journal.note("starts from a stored packing");
@@ -118,6 +126,7 @@ fn packing(
         return Ok((stored, false));
     }
     let stored = make(recipe, materials, under)?;
+    under.begin()?;
     kept_steps::forget_midway(under);
     packing_file::write(&own, &under.scene.name, &stored)?;
     if let Err(error) = kept_steps::remove(under.directory.path()) {
@@ -132,7 +141,8 @@ fn packing(
 }
 
 fn make(recipe: &dyn Recipe, materials: &Materials, under: &Under) -> Result<Stored, Failure> {
-    let keeper = Keeper::new(under, &materials.names)?;
+    let provenance = store::provenance(recipe)?.unwrap_or_default();
+    let keeper = Keeper::new(under, (provenance.clone(), &materials.names))?;
     let keys = (recipe.keys().seed, recipe.keys().step.preparation);
     let threads = under.threads_of_one_run();
     let mut shop = Workshop::new(materials, keys, threads, &keeper);
@@ -145,7 +155,7 @@ fn make(recipe: &dyn Recipe, materials: &Materials, under: &Under) -> Result<Sto
     Ok(Stored {
         packing,
         materials: materials.names.clone(),
-        provenance: store::provenance(recipe)?.unwrap_or_default(),
+        provenance,
         notes,
         grain_steps,
     })

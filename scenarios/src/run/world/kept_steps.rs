@@ -10,7 +10,9 @@ use crate::failure::Failure;
 use crate::journal::Journal;
 use crate::progress::Bar;
 use crate::run::Under;
-use colluvium_dem::preparation::{Look, Midway, Watch};
+use crate::run_directory::differing_keys;
+use crate::summary::Note;
+use colluvium_dem::preparation::{Look, Midway, Packing, Watch};
 use std::cell::RefCell;
 use std::ops::ControlFlow;
 use std::path::{Path, PathBuf};
@@ -22,6 +24,9 @@ pub const FOLDER: &str = "preparation";
 const STAGE: &str = "preparation";
 /// Array of such a checkpoint: the step's number, then the counts of its loops.
 const LOOPS: &str = "preparation/loops";
+/// Keys of a step's file: its number, and what it answered.
+const STEP: &str = "step";
+const ANSWER: &str = "answer";
 /// Steps that took less are done again rather than kept.
 const LONG: Duration = Duration::from_secs(2);
 
@@ -37,32 +42,61 @@ pub fn forget_midway(under: &mut Under) {
 
 /// Whether steps are kept in a run directory.
 pub fn exist(directory: &Path) -> bool {
-    directory.join(FOLDER).is_dir()
+    files(&directory.join(FOLDER)).is_ok_and(|files| !files.is_empty())
 }
 
 /// Removes them; files of other names stay.
 pub fn remove(directory: &Path) -> std::io::Result<()> {
     let folder = directory.join(FOLDER);
-    if !folder.is_dir() {
-        return Ok(());
-    }
-    for entry in std::fs::read_dir(&folder)? {
-        let entry = entry?;
-        let own = |name: &str| name.starts_with("step_");
-        if entry.file_name().to_str().is_some_and(own) {
-            std::fs::remove_file(entry.path())?;
-        }
+    for file in files(&folder)? {
+        std::fs::remove_file(file)?;
     }
     // Not empty if there is anything else in it.
     let _ = std::fs::remove_dir(&folder);
     Ok(())
 }
 
+/// `step_N.h5`, whole or not, in a folder, if there is one.
+fn files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
+    if !folder.is_dir() {
+        return Ok(Vec::new());
+    }
+    let own = |name: &str| {
+        let name = name.strip_suffix(".partial").unwrap_or(name);
+        let number = name
+            .strip_prefix("step_")
+            .and_then(|n| n.strip_suffix(".h5"));
+        number.is_some_and(|n| n.parse::<u64>().is_ok())
+    };
+    let mut files = Vec::new();
+    for entry in std::fs::read_dir(folder)? {
+        let entry = entry?;
+        if entry.file_type()?.is_file() && entry.file_name().to_str().is_some_and(own) {
+            files.push(entry.path());
+        }
+    }
+    Ok(files)
+}
+
+/// What a step came to.
+#[derive(Debug)]
+pub struct Outcome {
+    /// The packing.
+    pub packing: Packing,
+    /// Its notes.
+    pub notes: Vec<Note>,
+    /// Steps times grains that it took.
+    pub grain_steps: u64,
+    /// Whether it did what was asked for.
+    pub answer: bool,
+}
+
 /// Watches a preparation and keeps what it has come to.
 #[derive(Debug)]
 pub struct Keeper<'a> {
     under: &'a Under<'a>,
-    materials: &'a [String],
+    /// What the preparation goes by, and the names of its materials.
+    recipe: (toml::Table, &'a [String]),
     bar: Bar,
     /// The step that goes on, and from where.
     midway: RefCell<Option<(u64, Midway)>>,
@@ -75,7 +109,10 @@ impl<'a> Keeper<'a> {
     ///
     /// # Errors
     /// If the checkpoint has no step.
-    pub fn new(under: &'a Under<'a>, materials: &'a [String]) -> Result<Keeper<'a>, Failure> {
+    pub fn new(
+        under: &'a Under<'a>,
+        recipe: (toml::Table, &'a [String]),
+    ) -> Result<Keeper<'a>, Failure> {
         let midway = match midway(under) {
             Some(saved) => {
                 let mut record = saved.record.clone();
@@ -86,14 +123,15 @@ impl<'a> Keeper<'a> {
                 let loops = loops.to_vec();
                 Some((number, Midway { record, loops }))
             }
-            None => {
-                under.begin()?;
-                None
-            }
+            None => None,
         };
+        // What is kept is still to be accepted.
+        if midway.is_none() && !exist(under.directory.path()) {
+            under.begin()?;
+        }
         Ok(Keeper {
             under,
-            materials,
+            recipe,
             bar: Bar::new("preparation"),
             midway: RefCell::new(midway),
             failure: RefCell::default(),
@@ -123,23 +161,52 @@ impl<'a> Keeper<'a> {
         folder.join(format!("step_{step}.h5"))
     }
 
+    /// What the file of a step goes by.
+    fn provenance(&self, step: u64) -> toml::Table {
+        let mut keys = self.recipe.0.clone();
+        keys.insert(STEP.into(), (step as i64).into());
+        keys
+    }
+
     /// What a step came to before the run was stopped, if that was kept.
-    pub fn outcome(&self, step: u64) -> Result<Option<Stored>, Failure> {
+    pub fn outcome(&self, step: u64) -> Result<Option<Outcome>, Failure> {
         let path = self.path(step);
         if !path.exists() {
             return Ok(None);
         }
-        let stored = packing_file::read(&path).map_err(|why| {
-            let shown = path.display();
-            Failure::Run(format!(
-                "{shown} cannot be used: {why}; without it the step is done again"
+        let refuse = |why: String| {
+            Failure::Input(format!(
+                "--resume: {} cannot be used: {why}; nothing was changed; without it the step is done again",
+                path.display()
             ))
-        })?;
+        };
+        let mut stored = packing_file::read(&path).map_err(refuse)?;
+        let answer = stored.provenance.remove(ANSWER).and_then(|a| a.as_bool());
+        let (Some(answer), true) = (answer, stored.materials == self.recipe.1) else {
+            return Err(refuse("it was made by another preparation".into()));
+        };
+        let differing = differing_keys(&stored.provenance, &self.provenance(step), "");
+        if !differing.is_empty() {
+            let differing = differing.join(", ");
+            let why = format!("it was made by another preparation; differing: {differing}");
+            return Err(refuse(why));
+        }
         self.journal()
             .note(&format!("preparation: step {step} was done before"));
         // Killed before the next one was saved.
         self.midway.borrow_mut().take_if(|(of, _)| *of <= step);
-        Ok(Some(stored))
+        let Stored {
+            packing,
+            notes,
+            grain_steps,
+            ..
+        } = stored;
+        Ok(Some(Outcome {
+            packing,
+            notes,
+            grain_steps,
+            answer,
+        }))
     }
 
     /// Keeps what a step came to, if it took long from an instant on or went on.
@@ -147,10 +214,9 @@ impl<'a> Keeper<'a> {
         &self,
         step: &Step,
         began: Instant,
-        outcome: impl FnOnce() -> Stored,
+        outcome: impl FnOnce() -> Outcome,
     ) -> Result<(), Failure> {
-        // The state of a later step is still to be accepted.
-        if self.midway.borrow().is_some() {
+        if self.must_not_write() {
             return Ok(());
         }
         self.under.begin()?;
@@ -163,11 +229,23 @@ impl<'a> Keeper<'a> {
             let shown = folder.display();
             Failure::Run(format!("cannot make the folder {shown}: {error}"))
         })?;
+        let outcome = outcome();
+        let mut provenance = self.provenance(step.number);
+        provenance.insert(ANSWER.into(), outcome.answer.into());
         let stored = Stored {
-            materials: self.materials.to_vec(),
-            ..outcome()
+            packing: outcome.packing,
+            materials: self.recipe.1.to_vec(),
+            provenance,
+            notes: outcome.notes,
+            grain_steps: outcome.grain_steps,
         };
         packing_file::write(&self.path(step.number), &self.under.scene.name, &stored)
+    }
+
+    /// Whether a later state waits, of this preparation or of the run that it is for: what is done again must not take its place.
+    fn must_not_write(&self) -> bool {
+        let later = self.under.resumed.as_ref();
+        self.midway.borrow().is_some() || later.is_some_and(|saved| saved.stage != STAGE)
     }
 
     /// Watches a step.
@@ -194,10 +272,14 @@ pub struct Step<'a> {
 }
 
 impl Step<'_> {
+    /// Says which share of it is done.
+    pub fn progress(&self, share: f64) {
+        self.keeper.bar.set(share);
+    }
+
     /// Keeps the state if that is due, and stops the step if the user asked to.
     pub fn pass(&self, midway: impl FnOnce() -> Midway) -> ControlFlow<()> {
-        // A step that is done again must not take the place of a later one's state.
-        if self.keeper.midway.borrow().is_some() {
+        if self.keeper.must_not_write() {
             return self.pass_without_state();
         }
         let save = || {
@@ -231,9 +313,9 @@ impl Step<'_> {
 impl Watch for Step<'_> {
     fn look(&mut self, look: &mut Look) -> ControlFlow<()> {
         self.keeper.bar.say(&look.measures.to_string());
-        match look.can_go_on() {
-            true => self.pass(|| look.midway().unwrap_or_default()),
-            false => self.pass_without_state(),
+        match &mut look.state {
+            Some(state) => self.pass(|| state.midway()),
+            None => self.pass_without_state(),
         }
     }
 

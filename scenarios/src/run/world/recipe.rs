@@ -83,6 +83,11 @@ pub trait Recipe: Debug + Sync {
         Ok(())
     }
 
+    /// Whether its preparation can be done, as far as that can be told without doing it.
+    fn check_room(&self, _materials: &Materials, _origin: &str) -> Result<(), Failure> {
+        Ok(())
+    }
+
     /// Makes what the run needs beside its packing, of this step (s), and keeps it in the run's directory; or reads it there.
     fn stock(
         &self,

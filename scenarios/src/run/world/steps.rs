@@ -2,9 +2,11 @@
 
 use super::workshop::{Surroundings, Workshop, with_friction};
 use crate::failure::Failure;
-use crate::scene::world::{ClumpKeys, Place, PrepareKeys, PrepareKind};
-use colluvium_dem::preparation::{Aggregate, Amount, CentralCompaction, Relaxation, Stages};
-use colluvium_dem::{Grain, Wall};
+use crate::scene::world::{ClumpKeys, Materials, Place, PrepareKeys, PrepareKind};
+use colluvium_dem::preparation::{
+    Aggregate, Amount, CentralCompaction, Insertion, Relaxation, Stages, TRIES,
+};
+use colluvium_dem::{Domain, Grain, Wall};
 use nalgebra::{UnitQuaternion, Vector3};
 use std::collections::BTreeMap;
 
@@ -26,6 +28,67 @@ impl Around {
         let g = self.gravity.norm();
         if g > 0.0 { g } else { NONE }
     }
+}
+
+/// Densest random heap of grains that differ by less than a factor of two, and what nothing exceeds.
+const DENSEST: [f64; 2] = [0.64, 1.0];
+
+/// Whether grains that are inserted can find room in their regions at all.
+pub fn check_room(
+    steps: &[PrepareKeys],
+    materials: &Materials,
+    (domain, seed): (Domain, u64),
+    origin: &str,
+) -> Result<(), Failure> {
+    for (k, keys) in steps.iter().enumerate() {
+        // Regions after these lie in another box.
+        if [PrepareKind::Jam, PrepareKind::Scale, PrepareKind::Place].contains(&keys.r#do) {
+            break;
+        }
+        if keys.r#do != PrepareKind::Insert || keys.clumps.is_some() {
+            continue;
+        }
+        let section = format!("prepare[{k}]");
+        let at = Place {
+            origin,
+            section: &section,
+        };
+        let step = keys.step(at)?;
+        let Some(amount) = step.amount else {
+            continue;
+        };
+        let kinds = &materials.ingredients;
+        let insertion = Insertion {
+            region: step.region,
+            domain,
+            ingredients: kinds.clone(),
+            amount,
+            gap: 0.0,
+            velocity: Vector3::zeros(),
+            tries: TRIES,
+            seed,
+        };
+        let asked = insertion
+            .solid_fraction_asked()
+            .map_err(|error| Failure::Input(format!("{origin}: {section}: {error}")))?;
+        let largest = kinds.iter().map(|i| i.sizes.largest()).fold(0.0, f64::max);
+        let smallest = kinds.iter().map(|i| i.sizes.smallest());
+        let smallest = smallest.fold(f64::INFINITY, f64::min);
+        let densest = DENSEST[usize::from(largest > 2.0 * smallest)];
+        if asked > densest {
+            let (key, value) = match amount {
+                Amount::Grains(count) => ("count", count.to_string()),
+                Amount::SolidFraction(share) => ("solid_fraction", share.to_string()),
+                Amount::Mass(mass) => ("mass", mass.to_string()),
+            };
+            let room = format!(
+                "what fills less than {densest} of its region (`within`), where random places end near 0.38 for equal \
+                 grains; this would fill {asked:.3}"
+            );
+            return Err(at.refuse(key, value, room).into());
+        }
+    }
+    Ok(())
 }
 
 /// Does all steps.

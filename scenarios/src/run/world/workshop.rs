@@ -10,8 +10,7 @@ mod surroundings;
 
 pub use surroundings::{Surroundings, open_space, softened, stand_ins, step_for, with_friction};
 
-use super::kept_steps::{Keeper, Step};
-use super::packing_file::Stored;
+use super::kept_steps::{Keeper, Outcome, Step};
 use crate::failure::Failure;
 use crate::scene::world::Materials;
 use crate::summary::Note;
@@ -83,40 +82,39 @@ impl<'a> Workshop<'a> {
         }
     }
 
-    /// Does a step that may take long, from where it was stopped if it was.
-    pub fn step<T>(
-        &mut self,
-        work: impl FnOnce(&mut Self, &mut Step) -> Result<T, Failure>,
-    ) -> Result<T, Failure> {
-        let number = self.steps;
-        self.steps += 1;
-        work(self, &mut self.keeper.step(number))
-    }
-
-    /// Does a step that changes the packing, adds its notes and grain-steps, and gives nothing else: what it came to is kept if
-    /// it took long, and taken from there if the run was stopped later.
-    pub fn kept_step(
+    /// Does a step that changes the packing and adds its notes and grain-steps, from where it was stopped if it was. What it came
+    /// to is kept if it took long, and taken from there if the run was stopped later.
+    pub fn step(
         &mut self,
         work: impl FnOnce(&mut Self, &mut Step) -> Result<(), Failure>,
     ) -> Result<(), Failure> {
+        self.answering_step(|shop, step| work(shop, step).map(|()| true))
+            .map(drop)
+    }
+
+    /// The same of a step that says whether it did what was asked for.
+    fn answering_step(
+        &mut self,
+        work: impl FnOnce(&mut Self, &mut Step) -> Result<bool, Failure>,
+    ) -> Result<bool, Failure> {
         let number = self.steps;
         self.steps += 1;
-        if let Some(stored) = self.keeper.outcome(number)? {
-            self.packing = stored.packing;
-            self.notes.extend(stored.notes);
-            self.grain_steps += stored.grain_steps;
-            return Ok(());
+        if let Some(outcome) = self.keeper.outcome(number)? {
+            self.packing = outcome.packing;
+            self.notes.extend(outcome.notes);
+            self.grain_steps += outcome.grain_steps;
+            return Ok(outcome.answer);
         }
         let mut step = self.keeper.step(number);
         let (began, noted, paid) = (Instant::now(), self.notes.len(), self.grain_steps);
-        work(self, &mut step)?;
-        self.keeper.keep(&step, began, || Stored {
+        let answer = work(self, &mut step)?;
+        self.keeper.keep(&step, began, || Outcome {
             packing: self.packing.clone(),
-            materials: self.materials.names.clone(),
-            provenance: toml::Table::new(),
             notes: self.notes[noted..].to_vec(),
             grain_steps: self.grain_steps - paid,
-        })
+            answer,
+        })?;
+        Ok(answer)
     }
 
     /// Writes down what a step achieved.
@@ -239,7 +237,7 @@ impl<'a> Workshop<'a> {
             fill: colluvium_dem::preparation::FILL,
             seed: self.seed,
         };
-        self.kept_step(|shop, step| {
+        self.step(|shop, step| {
             let mut simulation = shop.simulation_of(around, step)?;
             let report = pour(&mut simulation, &spec, relaxation, step).map_err(ended)?;
             shop.take(simulation);
@@ -250,7 +248,7 @@ impl<'a> Workshop<'a> {
 
     /// Lets everything come to rest.
     pub fn relax(&mut self, around: &Surroundings, spec: &Relaxation) -> Result<(), Failure> {
-        self.kept_step(|shop, step| {
+        self.step(|shop, step| {
             let mut simulation = shop.simulation_of(around, step)?;
             let rest = relax(&mut simulation, spec, step).map_err(ended)?;
             shop.take(simulation);
@@ -265,7 +263,7 @@ impl<'a> Workshop<'a> {
         around: &Surroundings,
         spec: &Relaxation,
     ) -> Result<bool, Failure> {
-        self.step(|shop, step| {
+        self.answering_step(|shop, step| {
             let mut simulation = shop.simulation_of(around, step)?;
             let (rests, rest) = match relax(&mut simulation, spec, step) {
                 Ok(rest) => (true, rest),
@@ -280,7 +278,7 @@ impl<'a> Workshop<'a> {
 
     /// Lets the grains go for a time (s), and stops what still moves.
     pub fn let_go(&mut self, around: &Surroundings, time: f64) -> Result<(), Failure> {
-        self.kept_step(|shop, step| {
+        self.step(|shop, step| {
             let mut simulation = shop.simulation_of(around, step)?;
             let steps = (time / simulation.timestep()).ceil() as u64;
             advance_to(&mut simulation, steps, step)?;
@@ -296,7 +294,7 @@ impl<'a> Workshop<'a> {
         around: &Surroundings,
         spec: &CentralCompaction,
     ) -> Result<(), Failure> {
-        self.kept_step(|shop, step| {
+        self.step(|shop, step| {
             let mut simulation = shop.simulation_of(around, step)?;
             let report = compact(&mut simulation, spec, step).map_err(ended)?;
             shop.take(simulation);
@@ -317,7 +315,7 @@ impl<'a> Workshop<'a> {
             timestep: 1.0,
             threads: self.threads,
         };
-        self.kept_step(|shop, step| {
+        self.step(|shop, step| {
             let (mut simulation, reports) =
                 settle_in_stages(setup, &shop.packing.clumps, stages, step).map_err(ended)?;
             let grains = simulation.grain_count() as u64;
@@ -339,7 +337,7 @@ impl<'a> Workshop<'a> {
             overlap: 1e-4,
             seed: self.seed,
         };
-        self.kept_step(|shop, step| {
+        self.step(|shop, step| {
             let (packing, report) = jam(&spec, step).map_err(ended)?;
             shop.packing = packing;
             shop.note("jam", report);
@@ -373,7 +371,7 @@ impl<'a> Workshop<'a> {
             speed: 2.0 * (1.0 - factor).abs() * lengths.max() / spec.time,
             ..Surroundings::none(laws.clone())
         };
-        self.kept_step(|shop, step| {
+        self.step(|shop, step| {
             let mut simulation = shop.simulation_of(&around, step)?;
             if step.goes_on().is_none() {
                 simulation
@@ -416,6 +414,7 @@ fn advance_to(simulation: &mut Simulation, steps: u64, step: &Step) -> Result<()
         simulation
             .advance(STEPS_PER_LOOK.min(steps - simulation.steps_done()))
             .map_err(|error| Failure::Run(format!("preparation: {error}")))?;
+        step.progress(simulation.steps_done() as f64 / steps as f64);
         let state = || Midway {
             record: simulation.checkpoint(),
             loops: Vec::new(),

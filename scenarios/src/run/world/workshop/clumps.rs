@@ -51,7 +51,7 @@ impl Workshop<'_> {
             fill: FILL,
             seed: self.seed,
         };
-        let poured = self.kept_step(|shop, step| {
+        let poured = self.step(|shop, step| {
             let mut simulation = shop.simulation_of(around, step)?;
             let report = pour_clumps(&mut simulation, &spec, relaxation, step).map_err(ended)?;
             shop.take(simulation);
