@@ -430,6 +430,8 @@ fn outermost_missing(path: &Path) -> Option<PathBuf> {
 /// Removes what an earlier run wrote, so that old tables do not pass for new ones. Files of other
 /// names stay.
 fn remove_old_run(path: &Path) -> std::io::Result<()> {
+    // First what tells of a run that can be gone on with and is not found by its scene.
+    kept_steps::remove(path)?;
     let numbered = |name: &String| {
         (name.starts_with("profile_") && name.ends_with(".csv"))
             || (name.starts_with("fields_species_") && name.ends_with(".csv"))
@@ -452,7 +454,6 @@ fn remove_old_run(path: &Path) -> std::io::Result<()> {
         }
     }
     crate::render::remove(path)?;
-    kept_steps::remove(path)?;
     crate::frames::remove(path)
 }
 

@@ -238,6 +238,12 @@ fn a_preparation_that_is_stopped_says_how_to_go_on() {
         std::fs::copy(&first, &second).unwrap();
         refused(&resume, &["step_1.h5", "another preparation", "step"]);
         std::fs::remove_file(&second).unwrap();
+        // Found before the step that goes before it is done again.
+        std::fs::rename(&first, at.join("first")).unwrap();
+        std::fs::write(&second, "not a packing").unwrap();
+        refused(&resume, &["step_1.h5", "cannot be used"]);
+        std::fs::remove_file(&second).unwrap();
+        std::fs::rename(at.join("first"), &first).unwrap();
     }
     // Steps are enough to be kept from a new run.
     for name in ["checkpoint.h5", "checkpoint_before.h5"] {

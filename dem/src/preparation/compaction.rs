@@ -223,7 +223,8 @@ impl CentralCompaction {
             let steps = (unit / LOOKS / simulation.timestep()).ceil().max(1.0);
             let keep = (-self.relaxation.damping * steps * simulation.timestep() / unit).exp();
             let looks = (self.relaxation.patience * LOOKS) as u64;
-            if !(unit > 0.0 && *acceleration > 0.0 && done <= looks) {
+            let finite = unit.is_finite() && acceleration.is_finite();
+            if !(finite && unit > 0.0 && *acceleration > 0.0 && done <= looks.max(1)) {
                 return Err(out_of_place());
             }
             for look in done + 1..=looks.max(1) {
@@ -288,7 +289,7 @@ impl CentralCompaction {
                 (0, 0, time_unit(simulation, acceleration))
             }
         };
-        if !(unit > 0.0 && quiet < 3 && done <= looks) {
+        if !(unit > 0.0 && unit.is_finite() && quiet < 3 && done <= looks) {
             return Err(out_of_place());
         }
         let steps = (unit / LOOKS / simulation.timestep()).ceil().max(1.0);

@@ -121,7 +121,7 @@ pub(super) fn draw(
 }
 
 impl Amount {
-    fn validate(&self) -> Result<(), SetupError> {
+    pub(super) fn validate(&self) -> Result<(), SetupError> {
         match *self {
             Amount::Grains(count) => check("amount.grains", count as f64, "> 0", |v| v > 0.0),
             Amount::SolidFraction(share) => {

@@ -44,6 +44,9 @@ pub struct Insertion {
 /// Tries for one grain that fill up to 0.3 without fail.
 pub const TRIES: u32 = 20_000;
 
+/// Grains whose mean volume stands for that of more.
+const SAMPLE: usize = 10_000;
+
 /// What was inserted.
 #[derive(Clone, Debug, PartialEq, Serialize, Deserialize)]
 pub struct InsertionReport {
@@ -155,16 +158,32 @@ pub fn insert_loose(
 }
 
 impl Insertion {
-    /// Volume of the grains that are asked for over that of the region. Random places end near 0.38 for equal grains.
+    /// Volume of the grains that are asked for, where there are many by the mean of 10 000, and that of the region
+    /// (m³). Random places end near a part of 0.38 for equal grains.
     ///
     /// # Errors
     /// If a number is out of its range.
-    pub fn solid_fraction_asked(&self) -> Result<f64, SetupError> {
+    pub fn volumes(&self) -> Result<[f64; 2], SetupError> {
         self.validate()?;
         let volume = self.volume()?;
         let mut random = ChaCha8Rng::seed_from_u64(self.seed);
-        let grains = draw(&self.ingredients, self.amount, volume, &mut random)?;
-        Ok(grains.iter().map(Grain::volume).sum::<f64>() / volume)
+        let mut drawn = |count: usize| -> Result<f64, SetupError> {
+            let amount = Amount::Grains(count.min(SAMPLE));
+            let grains = draw(&self.ingredients, amount, volume, &mut random)?;
+            let sum: f64 = grains.iter().map(Grain::volume).sum();
+            Ok(sum * count as f64 / grains.len().max(1) as f64)
+        };
+        self.amount.validate()?;
+        let asked = match self.amount {
+            Amount::Grains(count) => drawn(count)?,
+            Amount::SolidFraction(share) => share * volume,
+            Amount::Mass(mass) => {
+                let kinds = self.ingredients.iter();
+                let parts: f64 = kinds.clone().map(|i| i.parts_by_volume).sum();
+                mass * parts / kinds.map(|i| i.parts_by_volume * i.density).sum::<f64>()
+            }
+        };
+        Ok([asked, volume])
     }
 
     pub(super) fn validate(&self) -> Result<(), SetupError> {

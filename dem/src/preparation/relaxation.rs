@@ -89,7 +89,7 @@ pub(super) fn relax_along(
     let steps = (unit / LOOKS / simulation.timestep()).ceil().max(1.0);
     let keep = (-spec.damping * steps * simulation.timestep() / unit).exp();
     let looks = (spec.patience * unit / (steps * simulation.timestep())).ceil() as u64;
-    if !(unit > 0.0 && done <= looks.max(MEASURE_EVERY)) {
+    if !(unit > 0.0 && unit.is_finite() && done <= looks.max(MEASURE_EVERY)) {
         return Err(out_of_place());
     }
     let mut measures = simulation.rest_measures(spec.acceleration);

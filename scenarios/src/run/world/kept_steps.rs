@@ -42,37 +42,44 @@ pub fn forget_midway(under: &mut Under) {
 
 /// Whether steps are kept in a run directory.
 pub fn exist(directory: &Path) -> bool {
-    files(&directory.join(FOLDER)).is_ok_and(|files| !files.is_empty())
+    files(&directory.join(FOLDER)).is_ok_and(|files| files.iter().any(|(_, whole)| *whole))
 }
 
 /// Removes them; files of other names stay.
 pub fn remove(directory: &Path) -> std::io::Result<()> {
     let folder = directory.join(FOLDER);
-    for file in files(&folder)? {
-        std::fs::remove_file(file)?;
+    for (step, whole) in files(&folder)? {
+        let name = name_of(step);
+        let partial = format!("{name}.partial");
+        std::fs::remove_file(folder.join(if whole { name } else { partial }))?;
     }
     // Not empty if there is anything else in it.
     let _ = std::fs::remove_dir(&folder);
     Ok(())
 }
 
-/// `step_N.h5`, whole or not, in a folder, if there is one.
-fn files(folder: &Path) -> std::io::Result<Vec<PathBuf>> {
+fn name_of(step: u64) -> String {
+    format!("step_{step}.h5")
+}
+
+/// Numbers of the steps that have files in a folder, and whether those are whole.
+fn files(folder: &Path) -> std::io::Result<Vec<(u64, bool)>> {
     if !folder.is_dir() {
         return Ok(Vec::new());
     }
-    let own = |name: &str| {
-        let name = name.strip_suffix(".partial").unwrap_or(name);
-        let number = name
-            .strip_prefix("step_")
-            .and_then(|n| n.strip_suffix(".h5"));
-        number.is_some_and(|n| n.parse::<u64>().is_ok())
-    };
     let mut files = Vec::new();
     for entry in std::fs::read_dir(folder)? {
         let entry = entry?;
-        if entry.file_type()?.is_file() && entry.file_name().to_str().is_some_and(own) {
-            files.push(entry.path());
+        let name = entry.file_name().into_string().unwrap_or_default();
+        let whole = name.strip_suffix(".partial").unwrap_or(&name);
+        let number = whole
+            .strip_prefix("step_")
+            .and_then(|n| n.strip_suffix(".h5"));
+        let number = number.and_then(|n| n.parse().ok());
+        if let Some(step) = number.filter(|&step| name_of(step) == whole)
+            && entry.file_type()?.is_file()
+        {
+            files.push((step, whole == name));
         }
     }
     Ok(files)
@@ -108,7 +115,7 @@ impl<'a> Keeper<'a> {
     /// A keeper of a run's preparation, which begins, or goes on from the run's checkpoint.
     ///
     /// # Errors
-    /// If the checkpoint has no step.
+    /// If the checkpoint has no step, or a step that is kept cannot be used.
     pub fn new(
         under: &'a Under<'a>,
         recipe: (toml::Table, &'a [String]),
@@ -125,17 +132,23 @@ impl<'a> Keeper<'a> {
             }
             None => None,
         };
-        // What is kept is still to be accepted.
-        if midway.is_none() && !exist(under.directory.path()) {
-            under.begin()?;
-        }
-        Ok(Keeper {
+        let begins = midway.is_none();
+        let keeper = Keeper {
             under,
             recipe,
             bar: Bar::new("preparation"),
             midway: RefCell::new(midway),
             failure: RefCell::default(),
-        })
+        };
+        let kept = files(&under.directory.file(FOLDER));
+        let kept = kept.map_err(|error| Failure::Run(format!("cannot read {FOLDER}: {error}")))?;
+        for (step, _) in kept.into_iter().filter(|(_, whole)| *whole) {
+            keeper.stored(step)?;
+        }
+        if begins {
+            under.begin()?;
+        }
+        Ok(keeper)
     }
 
     /// The log of the run.
@@ -149,6 +162,10 @@ impl<'a> Keeper<'a> {
         if let Some(why) = self.failure.into_inner() {
             return Err(why);
         }
+        if let Err(Failure::Run(_)) = made {
+            // Its state was accepted, and it has failed from there.
+            self.under.begin()?;
+        }
         made?;
         match self.midway.into_inner() {
             Some(_) => Err(Failure::damaged("its preparation has no such step")),
@@ -158,7 +175,7 @@ impl<'a> Keeper<'a> {
 
     fn path(&self, step: u64) -> PathBuf {
         let folder = self.under.directory.file(FOLDER);
-        folder.join(format!("step_{step}.h5"))
+        folder.join(name_of(step))
     }
 
     /// What the file of a step goes by.
@@ -168,12 +185,9 @@ impl<'a> Keeper<'a> {
         keys
     }
 
-    /// What a step came to before the run was stopped, if that was kept.
-    pub fn outcome(&self, step: u64) -> Result<Option<Outcome>, Failure> {
+    /// The file of a step, and what it answered.
+    fn stored(&self, step: u64) -> Result<(Stored, bool), Failure> {
         let path = self.path(step);
-        if !path.exists() {
-            return Ok(None);
-        }
         let refuse = |why: String| {
             Failure::Input(format!(
                 "--resume: {} cannot be used: {why}; nothing was changed; without it the step is done again",
@@ -191,6 +205,15 @@ impl<'a> Keeper<'a> {
             let why = format!("it was made by another preparation; differing: {differing}");
             return Err(refuse(why));
         }
+        Ok((stored, answer))
+    }
+
+    /// What a step came to before the run was stopped, if that was kept.
+    pub fn outcome(&self, step: u64) -> Result<Option<Outcome>, Failure> {
+        if !self.path(step).exists() {
+            return Ok(None);
+        }
+        let (stored, answer) = self.stored(step)?;
         self.journal()
             .note(&format!("preparation: step {step} was done before"));
         // Killed before the next one was saved.

@@ -30,8 +30,10 @@ impl Around {
     }
 }
 
-/// Densest random heap of grains that differ by less than a factor of two, and what nothing exceeds.
-const DENSEST: [f64; 2] = [0.64, 1.0];
+/// Solid fraction of the densest random heap of many grains that differ by less than a factor of two.
+const HEAP: f64 = 0.64;
+/// Largest grains whose volume makes a region wide: a few may fill one that is made for them.
+const MANY: f64 = 1000.0;
 
 /// Whether grains that are inserted can find room in their regions at all.
 pub fn check_room(
@@ -42,7 +44,13 @@ pub fn check_room(
 ) -> Result<(), Failure> {
     for (k, keys) in steps.iter().enumerate() {
         // Regions after these lie in another box.
-        if [PrepareKind::Jam, PrepareKind::Scale, PrepareKind::Place].contains(&keys.r#do) {
+        let moves = [
+            PrepareKind::Jam,
+            PrepareKind::Grow,
+            PrepareKind::Scale,
+            PrepareKind::Place,
+        ];
+        if moves.contains(&keys.r#do) {
             break;
         }
         if keys.r#do != PrepareKind::Insert || keys.clumps.is_some() {
@@ -68,13 +76,16 @@ pub fn check_room(
             tries: TRIES,
             seed,
         };
-        let asked = insertion
-            .solid_fraction_asked()
+        let [solid, volume] = insertion
+            .volumes()
             .map_err(|error| Failure::Input(format!("{origin}: {section}: {error}")))?;
         let largest = kinds.iter().map(|i| i.sizes.largest()).fold(0.0, f64::max);
         let smallest = kinds.iter().map(|i| i.sizes.smallest());
         let smallest = smallest.fold(f64::INFINITY, f64::min);
-        let densest = DENSEST[usize::from(largest > 2.0 * smallest)];
+        let alike = largest <= 2.0 * smallest;
+        let wide = volume > MANY * Grain::at_rest(Vector3::zeros(), largest, 1.0).volume();
+        let densest = if alike && wide { HEAP } else { 1.0 };
+        let asked = solid / volume;
         if asked > densest {
             let (key, value) = match amount {
                 Amount::Grains(count) => ("count", count.to_string()),
