@@ -98,11 +98,12 @@ fn a_relaxation_goes_on() {
         order(&states[2]),
         "lists have sorted the grains"
     );
-    let mut other = states[2].clone();
-    other.loops[1] += 1;
+    let mut other = states[0].clone();
+    other.loops[1] = (1.01 * f64::from_bits(other.loops[1])).to_bits();
+    let [other, own] = [other, states[0].clone()].map(|state| gone_on(&prepare, state).unwrap());
     assert_ne!(
-        gone_on(&prepare, other).unwrap(),
-        gone_on(&prepare, states[2].clone()).unwrap()
+        other, own,
+        "the unit of time that is kept is the one that is used"
     );
     // Patience counts from the beginning.
     let hasty = Relaxation {
