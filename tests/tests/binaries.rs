@@ -28,7 +28,9 @@ fn strays(package: &Path) -> Vec<PathBuf> {
     while let Some((folder, root)) = folders.pop() {
         let root_text = read_to_string(folder.join(root)).unwrap();
         for (name, path) in modules(&folder) {
-            let a_module = root_text.lines().any(|line| line == format!("mod {name};"));
+            let a_module = root_text
+                .lines()
+                .any(|line| line.strip_prefix("pub ").unwrap_or(line) == format!("mod {name};"));
             let a_binary = root == "main.rs" && manifest.contains(&format!("name = \"{name}\""));
             if !a_module && !a_binary {
                 strays.push(path.clone());
@@ -158,8 +160,8 @@ fn a_file_that_nothing_names_is_found() {
         "autotests = false\n[[test]]\nname = \"alone\"\n",
     );
     write("tests/main.rs", "mod named;\nmod folder;\n");
-    write("tests/folder/mod.rs", "mod inner;\n");
-    for name in ["alone", "named", "folder/inner"] {
+    write("tests/folder/mod.rs", "mod inner;\npub mod shared;\n");
+    for name in ["alone", "named", "folder/inner", "folder/shared"] {
         write(&format!("tests/{name}.rs"), "");
     }
     assert!(strays(package.path()).is_empty());
