@@ -30,7 +30,8 @@ impl Around {
     }
 }
 
-/// Solid fraction of the densest random heap of many grains that differ by less than a factor of two.
+/// Solid fraction of the densest random heap of many equal grains (Scott and Kilgour, J. Phys. D 2 (1969): 0.637); also a bound for
+/// random places of those that differ by less than a factor of two, which fill far less.
 const HEAP: f64 = 0.64;
 /// Largest grains whose volume makes a region wide: a few may fill one that is made for them.
 const MANY: f64 = 1000.0;
