@@ -61,7 +61,7 @@ pub mod rheology;
 pub mod silo;
 pub mod strain;
 pub mod terrain;
-mod threads;
+pub mod threads;
 pub mod units;
 pub mod vertical_chute;
 pub mod wall_friction;

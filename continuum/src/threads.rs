@@ -8,6 +8,7 @@
 //! side is cut by what there is to do, never by the number of threads, and every sum has one order, so that the bits do
 //! not depend on how many there are.
 
+use std::cell::Cell;
 use std::sync::atomic::{AtomicBool, Ordering};
 
 /// From so many unknowns on it pays to share what takes tens of microseconds.
@@ -17,6 +18,17 @@ pub(crate) const WORTH_HALVING: usize = 3;
 /// Looks for something to do before others are given way to.
 const PATIENCE: u32 = 64;
 
+thread_local! {
+    /// Parts of others' work that this thread has done.
+    static TAKEN: Cell<u64> = const { Cell::new(0) };
+}
+
+/// How many parts of others' work the calling thread has done: over the threads of a pool (`ThreadPool::broadcast`), whether
+/// a flow had more than one thread to itself.
+pub fn tasks_taken() -> u64 {
+    TAKEN.get()
+}
+
 /// Does both, side by side where `pays` and there is a thread for it.
 #[inline]
 pub(crate) fn join<A: Send, B: Send>(
@@ -25,8 +37,13 @@ pub(crate) fn join<A: Send, B: Send>(
     b: impl FnOnce() -> B + Send,
 ) -> (A, B) {
     if pays && are_many() {
-        #[cfg(test)]
-        let (a, b) = counted(a, b);
+        let giver = rayon::current_thread_index();
+        let b = move || {
+            if rayon::current_thread_index() != giver {
+                TAKEN.set(TAKEN.get() + 1);
+            }
+            b()
+        };
         rayon::join(a, b)
     } else {
         (a(), b())
@@ -128,22 +145,3 @@ impl Team {
         }
     }
 }
-
-/// Both, of which the second notes whether another thread has it.
-#[cfg(test)]
-fn counted<A: Send, B: Send>(
-    a: impl FnOnce() -> A + Send,
-    b: impl FnOnce() -> B + Send,
-) -> (impl FnOnce() -> A + Send, impl FnOnce() -> B + Send) {
-    let caller = rayon::current_thread_index();
-    let b = move || {
-        if rayon::current_thread_index() != caller {
-            tests::TAKEN.fetch_add(1, std::sync::atomic::Ordering::Relaxed);
-        }
-        b()
-    };
-    (a, b)
-}
-
-#[cfg(test)]
-mod tests;

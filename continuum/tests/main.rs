@@ -24,6 +24,7 @@ mod space;
 mod specks;
 mod steep_ground;
 mod terrain;
+mod threads;
 mod time_order;
 mod two_dimensions;
 mod walls;

@@ -184,9 +184,10 @@ fn a_stopped_campaign_keeps_its_angles_and_ends_the_same() {
         "--set",
         "calibration.compare_cells=16",
     ];
-    // Flows this short do not always determine a law: the first seed that does.
+    // Flows this short do not always determine a law: the first seed that does, begun with one that did.
     let whole = folder.path().join("whole");
-    let seed = (1..=8).map(|seed| format!("seed={seed}")).find(|seed| {
+    let seeds = [3].into_iter().chain(1..=8);
+    let seed = seeds.map(|seed| format!("seed={seed}")).find(|seed| {
         let one = [&short[..], &["--set", seed, "--threads", "1"]].concat();
         let done = colluvium(folder.path(), &arguments("calibrate", "whole", &one));
         assert!(done.status.success());

@@ -7,3 +7,4 @@ mod motion;
 pub mod packings;
 mod scene;
 mod slopes;
+mod steps;

@@ -1,29 +1,19 @@
 //! Flows have the same bits on 1, 2 and 3 threads, and where more than one is there they are used.
 
-use std::sync::atomic::{AtomicUsize, Ordering};
-use std::sync::{Mutex, PoisonError};
-
+use colluvium_continuum::column_collapse::{Collapse, CollapseCase, CollapseGround};
+use colluvium_continuum::cylinder_collapse::{CylinderCase, CylinderCollapse};
+use colluvium_continuum::free_surface::{Contact, SurfaceOptions};
+use colluvium_continuum::rheology::MuI;
+use colluvium_continuum::terrain::Profile;
+use colluvium_continuum::threads::tasks_taken;
 use rayon::ThreadPoolBuilder;
 
-use crate::column_collapse::{Collapse, CollapseCase, CollapseGround};
-use crate::cylinder_collapse::{CylinderCase, CylinderCollapse};
-use crate::free_surface::{Contact, SurfaceOptions};
-use crate::rheology::MuI;
-use crate::terrain::Profile;
-
-/// Tasks that another thread than the caller's has taken.
-pub(super) static TAKEN: AtomicUsize = AtomicUsize::new(0);
-
-/// The count is everybody's.
-static COUNTING: Mutex<()> = Mutex::new(());
-
 /// What some work gives on so many threads, and how many tasks were taken from the one that began.
-fn on<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> (T, usize) {
-    let _alone = COUNTING.lock().unwrap_or_else(PoisonError::into_inner);
+fn on<T: Send>(threads: usize, work: impl FnOnce() -> T + Send) -> (T, u64) {
     let pool = ThreadPoolBuilder::new().num_threads(threads).build();
-    let before = TAKEN.load(Ordering::Relaxed);
-    let found = pool.unwrap().install(work);
-    (found, TAKEN.load(Ordering::Relaxed) - before)
+    let pool = pool.unwrap();
+    let found = pool.install(work);
+    (found, pool.broadcast(|_| tasks_taken()).iter().sum())
 }
 
 /// The same bits from 1, 2 and 3 threads, which are used where there is more than one.
@@ -138,6 +128,5 @@ fn nobody_shares_without_a_pool_or_what_is_small() {
     };
     let (small, taken) = on(2, few);
     assert_eq!(taken, 0);
-    assert!(!super::are_many());
     assert!(small == few());
 }
