@@ -56,7 +56,7 @@ fn flow_at_33_degrees_agrees_with_lammps_and_carries_its_weight() {
     let start = Start::Flow {
         inertial_number: 0.25,
     };
-    let result = run(moderate_bed(), 33.0, start, Purpose::Measure, [50.0, 60.0]);
+    let result = run(small_bed(), 33.0, start, Purpose::Measure, [50.0, 60.0]);
     assert!(result.flows());
     let [mu, mu_zz, phi, mean] = deviation(&result.points);
     println!(
