@@ -253,16 +253,17 @@ fn bagnold(cells: usize, incline: [usize; 2], tilt: f64, contact: Contact) -> f6
 #[test]
 fn bagnold_flow_on_cut_inclines() {
     for (incline, tilt, most, order) in [
-        ([1, 8], 0.3, 2e-3, 1.9),
-        ([7, 16], 0.0, 2e-3, 1.0),
-        ([8, 8], -0.35, 2.6e-3, 1.2),
-        ([16, 8], -0.65, 4.2e-3, 1.7),
+        ([1, 8], 0.3, [2e-3, 8e-4, 7e-4], 0.6),
+        ([7, 16], 0.0, [2e-2, 7e-3, 3e-3], 1.2),
+        ([8, 8], -0.35, [3.5e-2, 1e-2, 2.9e-3], 1.7),
+        ([16, 8], -0.65, [4.5e-2, 1.3e-2, 4.2e-3], 1.6),
     ] {
         let errors = [8, 16, 32].map(|cells| bagnold(cells, incline, tilt, Contact::NoSlip));
         let observed = (errors[0] / errors[2]).log2() / 2.0;
         println!("{incline:?} at {tilt}: {errors:?}, order {observed:.2}");
+        let is_within = errors.iter().zip(most).all(|(error, most)| *error < most);
         assert!(
-            errors[2] < most && observed > order,
+            is_within && observed > order,
             "{incline:?}: {errors:?}, order {observed}"
         );
     }

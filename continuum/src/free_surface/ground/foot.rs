@@ -6,6 +6,14 @@ use super::{Ground, unit};
 use crate::free_surface::operators::Material;
 use crate::free_surface::topology::NONE;
 
+/// Part of the way from a corner down to the ground at which what sticks to it bears its pressure.
+///
+/// What follows an unknown weighs on it with its share of the velocity. Of a layer H deep over level ground, δ below a corner and
+/// sheared up to half a cell above it, δ moves with s = (δ/2)/(δ + 1/2). It yields at its friction where the mean pressure of what is
+/// sheared, δ below the corner and 1/2 above, is that at a depth of H − δ (1 − s): above it is that of the corner, H − δ, so below it is
+/// that half way. On slopes of 1/8 to 3/8 films yield by 0.003 to 0.03 cells of their depth too late then.
+const HALF_WAY: f64 = 0.5;
+
 impl<const D: usize, const C: usize> Material<'_, D, C> {
     /// The pressure at a corner, or on the ground there, which bears a press: interpolated between the cells around it, and of
     /// a layer in which one cell has a pressure its weight.
@@ -108,6 +116,9 @@ fn foot_of<const D: usize>(ground: &Ground<D>, cell: usize, corner: usize) -> [f
         at[axis] = side as f64;
     }
     let square: f64 = plane.normal.iter().map(|n| n * n).sum();
-    let depth = plane.depth(at) / square;
+    let depth = match plane.depth(at) / square {
+        above if above < 0.0 && !ground.contact.slides() => HALF_WAY * above,
+        depth => depth,
+    };
     std::array::from_fn(|axis| (depth * plane.normal[axis]).clamp(-0.5, 0.5))
 }

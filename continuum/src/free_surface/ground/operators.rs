@@ -9,7 +9,7 @@ use crate::free_surface::topology::NONE;
 impl<const D: usize, const C: usize> Material<'_, D, C> {
     pub(crate) fn operators_over<const V: usize>(&self, ground: &Ground<D>) -> Operators<D, C, V> {
         let count = self.faces.own.len();
-        let mut total = vec![0.0; count];
+        let mut heavy = vec![0.0; count];
         let mut parts = Parts {
             mass: vec![0.0; count],
             components: self.faces.own.iter().map(|&(c, _)| c).collect(),
@@ -23,22 +23,25 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             for (face, role) in roles.iter().enumerate() {
                 if let Some(j) = role.unknown() {
                     let mass = volume * self.filled_part(ground, j, component, face);
-                    total[j] += mass;
-                    parts.mass[j] += mass * self.faces.share(component, face);
+                    let share = self.faces.share(component, face);
+                    heavy[j] += mass * share.min(1.0);
+                    parts.mass[j] += mass * share;
                 }
             }
         }
-        // All of the mass is heavy, whatever its share of the unknown.
-        for (j, total) in total.iter().enumerate() {
+        // By virtual work what moves with a share of an unknown weighs on it with that share, and so it is in balance with stresses
+        // that work on what it is sheared by. Where the share is above one, beyond the height of the unknown, what is there moves with
+        // the next one as well.
+        for (j, heavy) in heavy.iter().enumerate() {
             let g = self.acceleration[parts.components[j]];
-            parts.boundary_load[j] = g * (total - parts.mass[j]);
+            parts.boundary_load[j] = g * (heavy - parts.mass[j]);
         }
         let most = self.most_points();
         parts.points.reserve(most);
         let mut places = Vec::with_capacity(most);
-        self.add_layers(ground, &total, &mut parts, &mut places);
-        self.add_pressures(ground, &total, &mut parts);
-        self.add_pressure_on_layers(&total, &mut parts);
+        self.add_layers(ground, &heavy, &mut parts, &mut places);
+        self.add_pressures(ground, &heavy, &mut parts);
+        self.add_pressure_on_layers(&heavy, &mut parts);
         for (cell, &fraction) in self.fractions.iter().enumerate() {
             if fraction <= EMPTY || ground.free[cell] == 0.0 {
                 continue;
@@ -80,10 +83,10 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
     fn add_pressures<const V: usize>(
         &self,
         ground: &Ground<D>,
-        total: &[f64],
+        heavy: &[f64],
         parts: &mut Parts<D, C, V>,
     ) {
-        let mut pushed = vec![0.0; total.len()];
+        let mut pushed = vec![0.0; heavy.len()];
         for (axis, roles) in self.faces.role.iter().enumerate() {
             for (face, role) in roles.iter().enumerate() {
                 if let Face::Follows(j) = *role
@@ -108,7 +111,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                         // its mass goes with the gradient at the face that leads it.
                         let other = self.topology.cell_neighbours[member][axis][side];
                         let mass = match role {
-                            Face::Own(j) => total[j] - pushed[j],
+                            Face::Own(j) => heavy[j] - pushed[j],
                             Face::Follows(j) if self.pushes(ground, j, axis, face) => {
                                 self.grid.cell_volume() * self.filled_part(ground, j, axis, face)
                             }
