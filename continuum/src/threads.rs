@@ -1,7 +1,7 @@
 //! Work side by side on the threads of the caller's pool.
 //!
 //! Threads of a pool go to sleep when there is nothing to do, and to wake one takes longer than most of what is done side by
-//! side in a step. So one of them stands by awake during an iteration on a step's equations ([`with_help`]); others have to be
+//! side in a step. So one of them stands by awake during an iteration on a step's equations; others have to be
 //! woken.
 //!
 //! A caller inside a pool of rayon's (`ThreadPool::install`) gets its threads; any other has one. What is done side by
