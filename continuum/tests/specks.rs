@@ -104,7 +104,7 @@ fn resting(slope: f64) -> usize {
 
 /// How many of 12 rest: 8 did at 0.25 while all of what followed an unknown over ground weighed on it, and 10 at 0.1.
 #[test]
-#[ignore = "three minutes"]
+#[ignore = "a minute"]
 fn columns_on_many_slopes_come_to_rest() {
     for (slope, least) in [(0.1, 12), (0.15, 12), (0.2, 12), (0.25, 11), (0.28, 4)] {
         let found = resting(slope);
