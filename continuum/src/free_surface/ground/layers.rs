@@ -272,7 +272,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
     pub(super) fn add_layers<const V: usize>(
         &self,
         ground: &Ground<D>,
-        total: &[f64],
+        heavy: &[f64],
         parts: &mut Parts<D, C, V>,
         places: &mut Vec<usize>,
     ) {
@@ -285,7 +285,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
             let (drive, share) = slope.drive(self.force_on_layer(ground, &slope, component, face));
             // Gravity is a load on the mass of every unknown.
             parts.boundary_load[j] =
-                total[j] * drive[component] - self.acceleration[component] * parts.mass[j];
+                heavy[j] * drive[component] - self.acceleration[component] * parts.mass[j];
             let axis = slope.axis;
             // What presses from outside acts on a surface as long as the ground below, of which each row bears the
             // share of what lies in it.
@@ -320,7 +320,7 @@ impl<const D: usize, const C: usize> Material<'_, D, C> {
                 }
             }
             point.weight *= (1.0 - 0.5 * beside) * share / slope.stretch().sqrt();
-            point.pressure_offset = total[j] / self.grid.face_area(axis) * weight;
+            point.pressure_offset = heavy[j] / self.grid.face_area(axis) * weight;
             point.law = match ground.contact {
                 Contact::Coulomb(friction) => PointLaw::OnWall(friction),
                 _ => PointLaw::Material,
